@@ -1,0 +1,19 @@
+//! Puts the board's memory map where the linker finds it, and asks for the linker scripts.
+
+use std::{env, fs, path::PathBuf};
+
+const BOARD: &str = "mps2";
+
+fn main() {
+    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
+    let map = format!("boards/{BOARD}/memory.x");
+    fs::copy(&map, out.join("board-memory.x")).expect("the board's memory map is readable");
+    println!("cargo:rerun-if-changed={map}");
+    println!("cargo:rerun-if-changed=../memory.x");
+    println!("cargo:rustc-link-search={}", out.display());
+    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+        println!("cargo:rustc-link-arg-bins={argument}");
+    }
+    // Without a level at build time, defmt drops everything below errors.
+    println!("cargo:rustc-env=DEFMT_LOG=info");
+}

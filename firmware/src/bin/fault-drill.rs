@@ -1,0 +1,63 @@
+//! Fault drill: the ECU's fault handlers, set off on purpose. The first argument says which.
+//!
+//! `panic`, `hard-fault`, `watchdog` (the main loop stops feeding it) and `hang` (interrupts and watchdog off, for the
+//! runner's time-out).
+
+#![no_std]
+#![no_main]
+
+use core::panic::PanicInfo;
+use firmware::board::{Board, Current};
+use firmware::exit::ExitCode;
+use firmware::recorder::Recorder;
+use firmware::{command_line, fault, stack};
+use shared_model::Scenario;
+use shared_model::controller::Ecu;
+use shared_model::telemetry::Header;
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    stack::paint();
+    drive_pwm();
+    let text = command_line::text().unwrap_or("");
+    match text.split_ascii_whitespace().nth(1) {
+        Some("panic") => panic!("drill"),
+        // SAFETY: not safe, and meant not to be: nothing is mapped there, so the read faults.
+        Some("hard-fault") => unsafe {
+            core::ptr::read_volatile(0xF000_0000 as *const u32);
+        },
+        Some("watchdog") => Current::start_watchdog(20),
+        Some("hang") => cortex_m::interrupt::disable(),
+        _ => fault::end_safely(ExitCode::BadScenario),
+    }
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+/// Brings the PWM off its neutral duty, so that the way back shows in the trailer of `drill.bin`.
+fn drive_pwm() {
+    use embedded_hal::pwm::SetDutyCycle;
+    let Ok(ecu) = Ecu::new(&Scenario::reconstruction()) else {
+        return;
+    };
+    let period = ecu.pwm.neutral().period();
+    let header = Header {
+        samples_per_step: 1,
+        step_rate_hz: 1,
+        pwm_period: period,
+        cost_clock_hz: Current::COST_CLOCK_HZ,
+        instruction_rate_hz: Current::INSTRUCTION_RATE_HZ,
+        initial: *ecu.control.state(),
+    };
+    let _ = Recorder::new(Some("drill.bin"), &header);
+    if let Ok(mut pwm) = Current::start_pwm(period) {
+        let _ = pwm.set_duty_cycle(period);
+    }
+    Current::stop_pwm_interrupt();
+}
+
+#[panic_handler]
+fn panic(_info: &PanicInfo<'_>) -> ! {
+    fault::end_safely(ExitCode::Panic)
+}

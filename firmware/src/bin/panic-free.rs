@@ -1,0 +1,42 @@
+//! Proof that the control path cannot panic: this image links only if no panic is reachable from its interrupts.
+//!
+//! The panic handler calls a function that nobody defines. Where the optimiser finds every panic unreachable, the handler
+//! and its call vanish; otherwise the linker misses the function, whose name says what went wrong. The feature
+//! `reachable-panic` puts a panic into the path, to see that the proof can fail. The image is never run.
+
+#![no_std]
+#![no_main]
+
+use core::panic::PanicInfo;
+use core::ptr::read_volatile;
+use firmware::tasks::{self, ControlInterrupt, PwmInterrupt};
+
+unsafe extern "C" {
+    fn a_panic_is_reachable_from_the_control_path() -> !;
+}
+
+/// Somewhere in RAM, so that the optimiser cannot know the tasks.
+const ANYWHERE: usize = 0x2000_8000;
+
+#[unsafe(no_mangle)]
+extern "C" fn main() -> ! {
+    // SAFETY: none; this image is linked, not run.
+    let (pwm, control) = unsafe {
+        (
+            read_volatile(ANYWHERE as *const PwmInterrupt),
+            read_volatile(ANYWHERE as *const ControlInterrupt),
+        )
+    };
+    #[cfg(feature = "reachable-panic")]
+    assert!(control.index != 7, "provoked");
+    tasks::hand_over(pwm, control, 10);
+    loop {
+        cortex_m::asm::wfi();
+    }
+}
+
+#[panic_handler]
+fn panic(_info: &PanicInfo<'_>) -> ! {
+    // SAFETY: there is no such function, which is the point.
+    unsafe { a_panic_is_reachable_from_the_control_path() }
+}

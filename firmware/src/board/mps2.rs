@@ -1,0 +1,132 @@
+//! Arm MPS2 with the AN386 (Cortex-M4F) or AN500 (Cortex-M7) image, as QEMU emulates them.
+//!
+//! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of RAM and records every code
+//! in a ring.
+
+use super::{Board, BoardError};
+use crate::recorder;
+use core::convert::Infallible;
+use core::ptr::{read_volatile, write_volatile};
+use core::sync::atomic::{AtomicU16, Ordering};
+use cortex_m::peripheral::{SYST, syst::SystClkSource};
+use embedded_hal::pwm::{ErrorType, SetDutyCycle};
+
+/// Clock of the core, SysTick and the APB timers, Hz.
+const CLOCK_HZ: u32 = 25_000_000;
+
+/// The emulator runs with `-icount shift=5`: 32 ns an instruction, a little above the real board's one instruction a
+/// clock at best, and slow enough that the 25 MHz counters resolve single instructions.
+const INSTRUCTION_RATE_HZ: u32 = 31_250_000;
+
+/// CMSDK APB timer 0: control, value and reload registers. Counts down.
+const TIMER0_CTRL: *mut u32 = 0x4000_0000 as *mut u32;
+const TIMER0_VALUE: *mut u32 = 0x4000_0004 as *mut u32;
+const TIMER0_RELOAD: *mut u32 = 0x4000_0008 as *mut u32;
+/// CMSDK watchdog: load, control, interrupt-clear and lock registers.
+const WATCHDOG_LOAD: *mut u32 = 0x4000_8000 as *mut u32;
+const WATCHDOG_CTRL: *mut u32 = 0x4000_8008 as *mut u32;
+const WATCHDOG_INTCLR: *mut u32 = 0x4000_800C as *mut u32;
+const WATCHDOG_LOCK: *mut u32 = 0x4000_8C00 as *mut u32;
+const WATCHDOG_UNLOCK_KEY: u32 = 0x1ACC_E551;
+/// Raises the non-maskable interrupt at the first expiry, without a reset at the second.
+const WATCHDOG_INTERRUPT: u32 = 1;
+
+static DUTY: AtomicU16 = AtomicU16::new(0);
+static PERIOD: AtomicU16 = AtomicU16::new(0);
+
+/// The board.
+pub struct Mps2;
+
+/// The virtual PWM.
+pub struct VirtualPwm {
+    period: u16,
+    recording: recorder::DutyRecording,
+}
+
+impl ErrorType for VirtualPwm {
+    type Error = Infallible;
+}
+
+impl SetDutyCycle for VirtualPwm {
+    fn max_duty_cycle(&self) -> u16 {
+        self.period
+    }
+
+    fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
+        let duty = duty.min(self.period);
+        DUTY.store(duty, Ordering::Relaxed);
+        self.recording.push(duty);
+        Ok(())
+    }
+}
+
+impl Board for Mps2 {
+    type Pwm = VirtualPwm;
+
+    const COST_CLOCK_HZ: u32 = CLOCK_HZ;
+    const INSTRUCTION_RATE_HZ: u32 = INSTRUCTION_RATE_HZ;
+
+    fn start_pwm(period: u16) -> Result<VirtualPwm, BoardError> {
+        let recording = recorder::take_duty_recording().ok_or(BoardError)?;
+        let mut core = cortex_m::Peripherals::take().ok_or(BoardError)?;
+        PERIOD.store(period, Ordering::Relaxed);
+        Self::neutralise_pwm();
+
+        // SAFETY: writes to registers of the timer, which nothing else uses.
+        unsafe {
+            write_volatile(TIMER0_RELOAD, u32::MAX);
+            write_volatile(TIMER0_VALUE, u32::MAX);
+            write_volatile(TIMER0_CTRL, 1);
+        }
+        core.SYST.set_clock_source(SystClkSource::Core);
+        core.SYST.set_reload(u32::from(period) - 1);
+        core.SYST.clear_current();
+        core.SYST.enable_interrupt();
+        core.SYST.enable_counter();
+        Ok(VirtualPwm { period, recording })
+    }
+
+    fn stop_pwm_interrupt() {
+        // SAFETY: a write to one register of SysTick, which only this module uses.
+        unsafe { (*SYST::PTR).csr.write(0) };
+    }
+
+    fn neutralise_pwm() {
+        DUTY.store(PERIOD.load(Ordering::Relaxed) / 2, Ordering::Relaxed);
+    }
+
+    fn pwm_output() -> (u16, u16) {
+        (
+            DUTY.load(Ordering::Relaxed),
+            PERIOD.load(Ordering::Relaxed) / 2,
+        )
+    }
+
+    fn cost_counter() -> u32 {
+        // SAFETY: a read of the timer's value register, without side effect.
+        unsafe { u32::MAX - read_volatile(TIMER0_VALUE) }
+    }
+
+    fn start_watchdog(timeout_ms: u32) {
+        // SAFETY: writes to registers of the watchdog, which nothing else uses.
+        unsafe {
+            write_volatile(WATCHDOG_LOCK, WATCHDOG_UNLOCK_KEY);
+            write_volatile(WATCHDOG_LOAD, timeout_ms * (CLOCK_HZ / 1000));
+            write_volatile(WATCHDOG_CTRL, WATCHDOG_INTERRUPT);
+        }
+    }
+
+    /// No WFI: a halted core hands every wake-up from one of the emulator's threads to the other, which takes longer than
+    /// to run through a block of instructions that do nothing.
+    // Out of line: the block is too long to be jumped over by the shortest branches.
+    #[inline(never)]
+    fn idle() {
+        // SAFETY: touches nothing.
+        unsafe { core::arch::asm!(".rept 256", "nop", ".endr", options(nomem, nostack)) };
+    }
+
+    fn feed_watchdog() {
+        // SAFETY: a write to the watchdog's clear register, which reloads its counter.
+        unsafe { write_volatile(WATCHDOG_INTCLR, 1) };
+    }
+}

@@ -1,0 +1,62 @@
+//! The scenario from the command line that the emulator was started with.
+
+use cortex_m_semihosting::syscall1;
+use shared_model::Scenario;
+use shared_model::settings::SettingError;
+
+/// SYS_GET_CMDLINE.
+const GET_COMMAND_LINE: usize = 0x15;
+/// Longest command line, bytes.
+const MAX_BYTES: usize = 4096;
+/// Key of the telemetry file's path, the one setting that is not of the scenario.
+const TELEMETRY: &str = "telemetry=";
+
+/// What the command line asks for.
+pub struct Command {
+    /// The scenario, not yet validated.
+    pub scenario: Scenario<f32>,
+    /// Path of the telemetry file on the host, if telemetry is wanted.
+    pub telemetry: Option<&'static str>,
+}
+
+/// Why the command line was refused.
+pub enum CommandError {
+    /// The host gives none, or a longer one than the buffer holds.
+    Unreadable,
+    /// A setting that is not one.
+    Setting(&'static str, SettingError),
+}
+
+/// Reads the command line: the image's name, then settings, separated by blanks.
+///
+/// # Errors
+/// If it cannot be read or has a setting that is not one.
+pub fn read() -> Result<Command, CommandError> {
+    parse(text().ok_or(CommandError::Unreadable)?)
+}
+
+/// The command line; `None` if the host has none or a longer one than the buffer, or at a second call.
+pub fn text() -> Option<&'static str> {
+    let buffer = cortex_m::singleton!(: [u8; MAX_BYTES] = [0; MAX_BYTES])?;
+    let mut block = [buffer.as_mut_ptr() as usize, MAX_BYTES];
+    // SAFETY: the operation writes at most MAX_BYTES bytes of the buffer and both words of the block.
+    let failed = unsafe { syscall1(GET_COMMAND_LINE, block.as_mut_ptr() as usize) };
+    let text = core::str::from_utf8(buffer.get(..block[1])?).ok()?;
+    (failed == 0).then_some(text.trim_end_matches('\0'))
+}
+
+fn parse(text: &'static str) -> Result<Command, CommandError> {
+    let mut command = Command {
+        scenario: Scenario::reconstruction(),
+        telemetry: None,
+    };
+    for word in text.split_ascii_whitespace().skip(1) {
+        if let Some(path) = word.strip_prefix(TELEMETRY) {
+            command.telemetry = Some(path);
+        } else {
+            let applied = command.scenario.apply(word);
+            applied.map_err(|error| CommandError::Setting(word, error))?;
+        }
+    }
+    Ok(command)
+}

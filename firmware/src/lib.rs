@@ -1,0 +1,23 @@
+//! Steering ECU: the program of `shared-model` on a Cortex-M, with interrupts, telemetry and a safe state around it. No
+//! arithmetic of the model is here.
+//!
+//! | question | module |
+//! |---|---|
+//! | what runs when? | [`app`] |
+//! | what does a board have to bring? | [`board`] |
+//! | what happens on a fault? | [`fault`] |
+//! | how do records leave the ECU? | [`recorder`] |
+//! | how do log lines? | [`log`] |
+
+#![no_std]
+
+pub mod app;
+pub mod board;
+pub mod command_line;
+pub mod exit;
+pub mod fault;
+pub mod host_file;
+pub mod log;
+pub mod recorder;
+pub mod stack;
+pub mod tasks;

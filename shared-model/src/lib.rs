@@ -1,0 +1,23 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+pub mod controller;
+pub mod dither;
+pub mod friction;
+pub mod integrate;
+pub mod parameter;
+pub mod real;
+pub mod scenario;
+pub mod servo;
+pub mod settings;
+pub mod steering;
+pub mod telemetry;
+pub mod tire;
+pub mod vehicle;
+
+pub use real::Real;
+pub use scenario::{InvalidScenario, Preset, Scenario};

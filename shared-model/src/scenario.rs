@@ -1,0 +1,426 @@
+//! A scenario: every parameter of one run, the presets, and the check that they fit together.
+
+use crate::dither::{Application, Dither, Waveform};
+use crate::friction::{Friction, FrictionLaw};
+use crate::parameter::{Field, OutOfRange, ParameterSet};
+use crate::servo::Servo;
+use crate::steering::Steering;
+use crate::tire::{LOW_FRICTION_ROAD, MagicFormula, TireModel};
+use crate::vehicle::{SlipForm, Vehicle};
+use crate::Real;
+use core::fmt;
+
+/// Most model steps of a run; a counter of 32 bits holds the PWM samples of it with room to spare.
+const MAX_SAMPLES: f64 = 4e9;
+
+/// The tyres of both axles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Tires<T> {
+    /// Which tyre the model uses.
+    pub model: TireModel,
+    /// Coefficients of the front axle, Table 1.
+    pub front: MagicFormula<T>,
+    /// Coefficients of the rear axle, Table 1.
+    pub rear: MagicFormula<T>,
+}
+
+/// Speed, rates, length and start of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Run<T> {
+    /// Wheel speed N, rpm.
+    pub wheel_speed_rpm: T,
+    /// Length of the run, s.
+    pub duration_s: T,
+    /// Rate of the control task, Hz: the model's step rate under averaged dither.
+    pub control_rate_hz: T,
+    /// Rate of the PWM task, Hz: carrier, dither samples, and the model's step rate under the dither as a signal.
+    pub pwm_rate_hz: T,
+    /// Sideslip angle beta at the start, rad.
+    pub sideslip_rad: T,
+    /// Yaw rate gamma at the start, rad/s.
+    pub yaw_rate_rad_per_s: T,
+    /// Front steering angle delta_f at the start, rad.
+    pub steering_angle_rad: T,
+    /// Steering rate at the start, rad/s.
+    pub steering_rate_rad_per_s: T,
+}
+
+impl<T: Real> ParameterSet<T> for Run<T> {
+    const SECTION: &'static str = "run";
+    const FIELDS: &'static [Field<Self, T>] = &[
+        Field {
+            name: "wheel_speed_rpm",
+            min: 1.0,
+            max: 1e5,
+            place: |p| &mut p.wheel_speed_rpm,
+        },
+        Field {
+            name: "duration_s",
+            min: 1e-4,
+            max: 1e6,
+            place: |p| &mut p.duration_s,
+        },
+        Field {
+            name: "control_rate_hz",
+            min: 10.0,
+            max: 1e6,
+            place: |p| &mut p.control_rate_hz,
+        },
+        Field {
+            name: "pwm_rate_hz",
+            min: 10.0,
+            max: 1e6,
+            place: |p| &mut p.pwm_rate_hz,
+        },
+        Field {
+            name: "sideslip_rad",
+            min: -10.0,
+            max: 10.0,
+            place: |p| &mut p.sideslip_rad,
+        },
+        Field {
+            name: "yaw_rate_rad_per_s",
+            min: -100.0,
+            max: 100.0,
+            place: |p| &mut p.yaw_rate_rad_per_s,
+        },
+        Field {
+            name: "steering_angle_rad",
+            min: -10.0,
+            max: 10.0,
+            place: |p| &mut p.steering_angle_rad,
+        },
+        Field {
+            name: "steering_rate_rad_per_s",
+            min: -1000.0,
+            max: 1000.0,
+            place: |p| &mut p.steering_rate_rad_per_s,
+        },
+    ];
+}
+
+/// Every parameter of one run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Scenario<T> {
+    /// Chassis.
+    pub vehicle: Vehicle<T>,
+    /// Tyres.
+    pub tires: Tires<T>,
+    /// Steering actuator.
+    pub steering: Steering<T>,
+    /// Dry friction of the steering.
+    pub friction: Friction<T>,
+    /// Dither.
+    pub dither: Dither<T>,
+    /// Servo drive.
+    pub servo: Servo<T>,
+    /// Speed, rates, length and start.
+    pub run: Run<T>,
+}
+
+/// A named scenario.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Preset {
+    /// The reading of the paper that reproduces its claims: Coulomb friction on the steering rate with true stick.
+    Reconstruction,
+    /// The equations as printed: friction by the sign of the steering angle.
+    Printed,
+}
+
+impl<T: Real> Scenario<T> {
+    /// The scenario of a preset.
+    pub fn preset(preset: Preset) -> Self {
+        match preset {
+            Preset::Reconstruction => Self::reconstruction(),
+            Preset::Printed => Self::printed(),
+        }
+    }
+
+    /// The reading of the paper that reproduces its claims, at 1750 rpm without dither: set A of Table 1 with the cubic
+    /// tyre and the printed sign, small slip angles, Coulomb friction on the steering rate with true stick, mu = 0.28.
+    pub fn reconstruction() -> Self {
+        const PER_TAU: f64 = 1.0 / core::f64::consts::TAU;
+        Scenario {
+            vehicle: Vehicle {
+                slip_form: SlipForm::SmallAngle,
+                mass_kg: 1500.0,
+                yaw_inertia_kg_m2: 2000.0,
+                front_axle_distance_m: 1.2,
+                rear_axle_distance_m: 1.3,
+                wheel_radius_m: 0.3,
+            },
+            tires: Tires {
+                model: TireModel::Cubic,
+                front: LOW_FRICTION_ROAD.0,
+                rear: LOW_FRICTION_ROAD.1,
+            },
+            steering: Steering {
+                inertia_kg_m2: 10.0,
+                damping_nm_s_per_rad: 200.0,
+                ratio: 30.0,
+                motor_constant_nm_per_a: 0.078,
+                motor_current_a: 10.0,
+                efficiency: 0.7,
+                pneumatic_trail_m: 0.012,
+                mechanical_trail_m: 0.010,
+            },
+            friction: Friction {
+                law: FrictionLaw::CoulombRate,
+                dithered: false,
+                coefficient: 0.28,
+                front_wheel_load_kg: 200.0,
+            },
+            dither: Dither {
+                waveform: Waveform::None,
+                application: Application::Averaged,
+                amplitude_v: 0.0,
+                square_frequency_rad_per_s: 2000.0,
+                sine_frequency_rad_per_s: 4000.0,
+                start_time_s: 3.0,
+                square_rad_per_volt: 1.0,
+                // Puts the paper's 0.8 to 1.2 V onto the period-one range of its sine dither.
+                sine_rad_per_volt: PER_TAU,
+            },
+            servo: Servo {
+                bus_voltage_v: 12.0,
+                winding_resistance_ohm: 0.3,
+                timer_clock_hz: 25e6,
+            },
+            run: Run {
+                wheel_speed_rpm: 1750.0,
+                duration_s: 20.0,
+                control_rate_hz: 1000.0,
+                pwm_rate_hz: 10_000.0,
+                sideslip_rad: 0.15,
+                yaw_rate_rad_per_s: 0.0,
+                steering_angle_rad: 0.46,
+                steering_rate_rad_per_s: 0.0,
+            },
+        }
+        .map(&T::from_f64)
+    }
+
+    /// The paper's equations as printed: as [`reconstruction`](Self::reconstruction), but with friction by the sign of the
+    /// steering angle, dithered with it, equations (13) and (27).
+    pub fn printed() -> Self {
+        let mut scenario = Self::reconstruction();
+        scenario.friction.law = FrictionLaw::PrintedAngle;
+        scenario.friction.dithered = true;
+        scenario
+    }
+
+    /// The same scenario in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Scenario<U> {
+        let run = &self.run;
+        Scenario {
+            vehicle: self.vehicle.map(f),
+            tires: Tires {
+                model: self.tires.model,
+                front: self.tires.front.map(f),
+                rear: self.tires.rear.map(f),
+            },
+            steering: self.steering.map(f),
+            friction: self.friction.map(f),
+            dither: self.dither.map(f),
+            servo: self.servo.map(f),
+            run: Run {
+                wheel_speed_rpm: f(run.wheel_speed_rpm),
+                duration_s: f(run.duration_s),
+                control_rate_hz: f(run.control_rate_hz),
+                pwm_rate_hz: f(run.pwm_rate_hz),
+                sideslip_rad: f(run.sideslip_rad),
+                yaw_rate_rad_per_s: f(run.yaw_rate_rad_per_s),
+                steering_angle_rad: f(run.steering_angle_rad),
+                steering_rate_rad_per_s: f(run.steering_rate_rad_per_s),
+            },
+        }
+    }
+
+    /// Checks every number, and that the numbers fit together.
+    ///
+    /// # Errors
+    /// The first fault found.
+    ///
+    /// ```
+    /// let mut scenario = shared_model::Scenario::reconstruction();
+    /// scenario.vehicle.mass_kg = -1500.0_f64;
+    /// assert_eq!(
+    ///     scenario.validate().unwrap_err().to_string(),
+    ///     "vehicle.mass_kg = -1500: must be a finite number from 1 to 100000"
+    /// );
+    /// ```
+    pub fn validate(&self) -> Result<(), InvalidScenario> {
+        self.vehicle.validate()?;
+        self.tires.front.validate_as("tires.front")?;
+        self.tires.rear.validate_as("tires.rear")?;
+        self.steering.validate()?;
+        self.friction.validate()?;
+        self.dither.validate()?;
+        self.servo.validate()?;
+        self.run.validate()?;
+        self.validate_rates()?;
+        self.validate_voltage()
+    }
+
+    fn validate_rates(&self) -> Result<(), InvalidScenario> {
+        let run = &self.run;
+        let (control_hz, pwm_hz) = (run.control_rate_hz.to_f64(), run.pwm_rate_hz.to_f64());
+        let (control, pwm) = (run.control_rate_hz.to_u32(), run.pwm_rate_hz.to_u32());
+        let whole = f64::from(control) == control_hz && f64::from(pwm) == pwm_hz;
+        if !whole || control == 0 || !pwm.is_multiple_of(control) {
+            return Err(InvalidScenario::Rates { control_hz, pwm_hz });
+        }
+        let counts = self.servo.period_counts(run.pwm_rate_hz);
+        if !(2..=u32::from(u16::MAX)).contains(&counts) {
+            return Err(InvalidScenario::TimerPeriod { counts });
+        }
+        let samples = run.duration_s.to_f64() * pwm_hz;
+        if self.steps() == 0 || samples > MAX_SAMPLES {
+            return Err(InvalidScenario::Duration {
+                duration_s: run.duration_s.to_f64(),
+                min_s: 1.0 / self.model_rate_hz().to_f64(),
+                max_s: MAX_SAMPLES / pwm_hz,
+            });
+        }
+        Ok(())
+    }
+
+    fn validate_voltage(&self) -> Result<(), InvalidScenario> {
+        let dither_v = self.dither.active_amplitude_v();
+        let motor_v = self.motor_voltage_v();
+        if motor_v.abs() + dither_v <= self.servo.bus_voltage_v {
+            return Ok(());
+        }
+        Err(InvalidScenario::OverVoltage {
+            motor_v: motor_v.to_f64(),
+            dither_v: dither_v.to_f64(),
+            bus_v: self.servo.bus_voltage_v.to_f64(),
+        })
+    }
+
+    /// Voltage that drives the motor current through the winding, V.
+    pub fn motor_voltage_v(&self) -> T {
+        self.steering.motor_current_a * self.servo.winding_resistance_ohm
+    }
+
+    /// Rate at which the model is stepped, Hz.
+    pub fn model_rate_hz(&self) -> T {
+        match self.dither.application {
+            Application::Averaged => self.run.control_rate_hz,
+            Application::Signal => self.run.pwm_rate_hz,
+        }
+    }
+
+    /// Length of a model step, s.
+    pub fn step_s(&self) -> T {
+        T::one() / self.model_rate_hz()
+    }
+
+    /// Model steps of the run.
+    pub fn steps(&self) -> u32 {
+        self.steps_until(self.run.duration_s)
+    }
+
+    /// Model steps before the dither sets in.
+    pub fn dither_start_step(&self) -> u32 {
+        self.steps_until(self.dither.start_time_s)
+    }
+
+    fn steps_until(&self, time_s: T) -> u32 {
+        (time_s * self.model_rate_hz() + T::from_f64(0.5)).to_u32()
+    }
+
+    /// PWM samples in a model step.
+    pub fn samples_per_step(&self) -> u32 {
+        (self.run.pwm_rate_hz / self.model_rate_hz() + T::from_f64(0.5))
+            .to_u32()
+            .max(1)
+    }
+}
+
+/// Why a scenario cannot be run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum InvalidScenario {
+    /// A number is not finite or not in its range.
+    OutOfRange(OutOfRange),
+    /// The rates are not whole numbers, or the PWM rate is no multiple of the control rate.
+    Rates {
+        /// Control rate, Hz.
+        control_hz: f64,
+        /// PWM rate, Hz.
+        pwm_hz: f64,
+    },
+    /// The carrier period does not fit the timer.
+    TimerPeriod {
+        /// Period asked for, counts.
+        counts: u32,
+    },
+    /// The run is shorter than one step or longer than the counters.
+    Duration {
+        /// Length asked for, s.
+        duration_s: f64,
+        /// Least length, s.
+        min_s: f64,
+        /// Greatest length, s.
+        max_s: f64,
+    },
+    /// Motor and dither together ask for more than the bus has.
+    OverVoltage {
+        /// Voltage of the motor current, V.
+        motor_v: f64,
+        /// Dither amplitude, V.
+        dither_v: f64,
+        /// Bus voltage, V.
+        bus_v: f64,
+    },
+}
+
+impl From<OutOfRange> for InvalidScenario {
+    fn from(error: OutOfRange) -> Self {
+        Self::OutOfRange(error)
+    }
+}
+
+impl fmt::Display for InvalidScenario {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::OutOfRange(ref error) => error.fmt(f),
+            Self::Rates { control_hz, pwm_hz } => write!(
+                f,
+                "run.pwm_rate_hz = {pwm_hz} and run.control_rate_hz = {control_hz}: both must be whole numbers, the first a \
+                 multiple of the second"
+            ),
+            Self::TimerPeriod { counts } => write!(
+                f,
+                "servo.timer_clock_hz over run.pwm_rate_hz is {counts} counts: must be from 2 to {}",
+                u16::MAX
+            ),
+            Self::Duration {
+                duration_s,
+                min_s,
+                max_s,
+            } => write!(
+                f,
+                "run.duration_s = {duration_s}: must be from {min_s} (one step) to {max_s}"
+            ),
+            Self::OverVoltage {
+                motor_v,
+                dither_v,
+                bus_v,
+            } => write!(
+                f,
+                "dither.amplitude_v = {dither_v}: with {motor_v} V for the motor current it exceeds servo.bus_voltage_v = \
+                 {bus_v}; at most {} V are left for the dither",
+                (bus_v - motor_v.abs()).max(0.0)
+            ),
+        }
+    }
+}
+
+impl core::error::Error for InvalidScenario {}

@@ -1,0 +1,195 @@
+//! Servo drive: volts to PWM duty and back.
+//!
+//! A full bridge at duty d puts the mean voltage (2 d - 1) V_bus on the servo, so half duty is neutral. The timer counts
+//! the duty in whole steps of its period.
+
+use crate::Real;
+use crate::parameter::{Field, ParameterSet};
+use core::fmt;
+
+/// Parameters of the servo drive. The paper has none; these are assumed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Servo<T> {
+    /// Bus voltage, V.
+    pub bus_voltage_v: T,
+    /// Resistance of the motor's winding, ohm: turns the motor current into the voltage that drives it at rest.
+    pub winding_resistance_ohm: T,
+    /// Clock of the PWM timer, Hz. The carrier period is this over the PWM rate, in whole counts.
+    pub timer_clock_hz: T,
+}
+
+impl<T: Real> Servo<T> {
+    /// Counts of the timer in one carrier period, rounded; 0 and values over 65535 do not fit a timer.
+    pub fn period_counts(&self, pwm_rate_hz: T) -> u32 {
+        (self.timer_clock_hz / pwm_rate_hz + T::from_f64(0.5)).to_u32()
+    }
+
+    /// The same parameters in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Servo<U> {
+        Servo {
+            bus_voltage_v: f(self.bus_voltage_v),
+            winding_resistance_ohm: f(self.winding_resistance_ohm),
+            timer_clock_hz: f(self.timer_clock_hz),
+        }
+    }
+}
+
+impl<T: Real> ParameterSet<T> for Servo<T> {
+    const SECTION: &'static str = "servo";
+    const FIELDS: &'static [Field<Self, T>] = &[
+        Field {
+            name: "bus_voltage_v",
+            min: 0.1,
+            max: 1000.0,
+            place: |p| &mut p.bus_voltage_v,
+        },
+        Field {
+            name: "winding_resistance_ohm",
+            min: 0.0,
+            max: 100.0,
+            place: |p| &mut p.winding_resistance_ohm,
+        },
+        Field {
+            name: "timer_clock_hz",
+            min: 1e3,
+            max: 1e9,
+            place: |p| &mut p.timer_clock_hz,
+        },
+    ];
+}
+
+/// Duty cycle as the timer has it: `code` counts high out of `period`. The code is never above the period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Duty {
+    code: u16,
+    period: u16,
+}
+
+/// A duty code above the timer's period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DutyOutOfRange {
+    /// The code that was refused.
+    pub code: u16,
+    /// Greatest allowed code.
+    pub period: u16,
+}
+
+impl fmt::Display for DutyOutOfRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "duty code {}: must be from 0 to {}",
+            self.code, self.period
+        )
+    }
+}
+
+impl core::error::Error for DutyOutOfRange {}
+
+impl Duty {
+    /// A duty of `code` counts out of `period`.
+    ///
+    /// # Errors
+    /// If the code is above the period.
+    ///
+    /// ```
+    /// use shared_model::servo::Duty;
+    /// assert_eq!(Duty::new(1250, 2500).unwrap().code(), 1250);
+    /// assert!(Duty::new(2501, 2500).is_err());
+    /// ```
+    pub fn new(code: u16, period: u16) -> Result<Self, DutyOutOfRange> {
+        if code > period {
+            return Err(DutyOutOfRange { code, period });
+        }
+        Ok(Self { code, period })
+    }
+
+    /// Counts high.
+    pub fn code(self) -> u16 {
+        self.code
+    }
+
+    /// Counts of a carrier period.
+    pub fn period(self) -> u16 {
+        self.period
+    }
+}
+
+/// The servo's PWM: conversion between volts and duty at one carrier frequency.
+#[derive(Debug, Clone, Copy)]
+pub struct Pwm<T> {
+    period: u16,
+    counts_per_volt: T,
+    midpoint: T,
+}
+
+impl<T: Real> Pwm<T> {
+    /// The PWM of a servo at the given carrier frequency. A period that fits no 16-bit timer is cut to 65535 counts;
+    /// [`Scenario::validate`](crate::Scenario::validate) refuses it before.
+    pub fn new(servo: &Servo<T>, pwm_rate_hz: T) -> Self {
+        let period = u16::try_from(servo.period_counts(pwm_rate_hz)).unwrap_or(u16::MAX);
+        let midpoint = T::from_f64(0.5) * T::from_u32(period.into());
+        Self {
+            period,
+            counts_per_volt: midpoint / servo.bus_voltage_v,
+            midpoint,
+        }
+    }
+
+    /// The duty nearest to `volts`; outside the bus voltage it saturates, and NaN gives the neutral duty.
+    ///
+    /// ```
+    /// use shared_model::{Scenario, servo::Pwm};
+    /// let pwm = Pwm::new(&Scenario::reconstruction().servo, 10e3);
+    /// assert_eq!(pwm.duty(0.0).code(), 1250);
+    /// assert_eq!(pwm.duty(0.1).code(), 1260);
+    /// assert_eq!(pwm.duty(100.0).code(), 2500);
+    /// assert_eq!(pwm.duty(-100.0).code(), 0);
+    /// assert_eq!(pwm.duty(f64::NAN), pwm.neutral());
+    /// ```
+    pub fn duty(&self, volts: T) -> Duty {
+        let counts = self.midpoint + volts * self.counts_per_volt;
+        let top = T::from_u32(self.period.into());
+        let code = if counts >= top {
+            self.period
+        } else if counts >= T::zero() {
+            // Below the period, so it fits; the least of the two all the same, for a proof that needs no reasoning.
+            let rounded = (counts + T::from_f64(0.5)).to_u32();
+            rounded.min(self.period.into()) as u16
+        } else if counts < T::zero() {
+            0
+        } else {
+            self.neutral().code
+        };
+        Duty {
+            code,
+            period: self.period,
+        }
+    }
+
+    /// Mean voltage of a duty, V.
+    ///
+    /// ```
+    /// use shared_model::{Scenario, servo::Pwm};
+    /// let pwm = Pwm::new(&Scenario::reconstruction().servo, 10e3);
+    /// assert!((pwm.volts(pwm.duty(1.0)) - 1.0_f64).abs() <= 0.5 * pwm.volts_per_count());
+    /// ```
+    pub fn volts(&self, duty: Duty) -> T {
+        (T::from_u32(duty.code.into()) - self.midpoint) / self.counts_per_volt
+    }
+
+    /// Voltage of one count, V: the resolution.
+    pub fn volts_per_count(&self) -> T {
+        T::one() / self.counts_per_volt
+    }
+
+    /// The duty of no voltage, to within half a count.
+    pub fn neutral(&self) -> Duty {
+        Duty {
+            code: self.period / 2,
+            period: self.period,
+        }
+    }
+}

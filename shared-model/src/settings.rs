@@ -1,0 +1,158 @@
+//! Scenarios as text, one `section.name=value` a setting: how a scenario reaches the ECU without a rebuild.
+
+use crate::Real;
+use crate::dither::{Application, Waveform};
+use crate::friction::FrictionLaw;
+use crate::parameter::ParameterSet;
+use crate::scenario::{Preset, Scenario};
+use crate::tire::TireModel;
+use crate::vehicle::SlipForm;
+use core::fmt;
+use core::str::FromStr;
+
+/// A parameter that is one of a few names.
+pub trait Choice: Copy + PartialEq + 'static {
+    /// All choices with their names, as in the configuration file.
+    const ALL: &'static [(&'static str, Self)];
+
+    /// The choice of that name.
+    fn from_name(name: &str) -> Option<Self> {
+        let named = Self::ALL.iter().find(|(known, _)| *known == name);
+        named.map(|&(_, choice)| choice)
+    }
+}
+
+impl Choice for Preset {
+    const ALL: &'static [(&'static str, Self)] = &[
+        ("reconstruction", Self::Reconstruction),
+        ("printed", Self::Printed),
+    ];
+}
+
+impl Choice for SlipForm {
+    const ALL: &'static [(&'static str, Self)] =
+        &[("small_angle", Self::SmallAngle), ("exact", Self::Exact)];
+}
+
+impl Choice for TireModel {
+    const ALL: &'static [(&'static str, Self)] =
+        &[("cubic", Self::Cubic), ("magic_formula", Self::MagicFormula)];
+}
+
+impl Choice for FrictionLaw {
+    const ALL: &'static [(&'static str, Self)] = &[
+        ("none", Self::None),
+        ("coulomb_rate", Self::CoulombRate),
+        ("printed_angle", Self::PrintedAngle),
+    ];
+}
+
+impl Choice for Waveform {
+    const ALL: &'static [(&'static str, Self)] = &[
+        ("none", Self::None),
+        ("square", Self::Square),
+        ("sine", Self::Sine),
+    ];
+}
+
+impl Choice for Application {
+    const ALL: &'static [(&'static str, Self)] =
+        &[("averaged", Self::Averaged), ("signal", Self::Signal)];
+}
+
+impl Choice for bool {
+    const ALL: &'static [(&'static str, Self)] = &[("true", true), ("false", false)];
+}
+
+/// Why a setting was not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SettingError {
+    /// Not of the form `key=value`.
+    NoEqualsSign,
+    /// No parameter of that name.
+    UnknownKey,
+    /// The value is not a number.
+    NotANumber,
+    /// The value is none of the parameter's names.
+    UnknownChoice,
+}
+
+impl SettingError {
+    /// What is wrong, in words.
+    pub fn reason(self) -> &'static str {
+        match self {
+            Self::NoEqualsSign => "must be key=value",
+            Self::UnknownKey => "no parameter of that name",
+            Self::NotANumber => "the value is not a number",
+            Self::UnknownChoice => "the value is none of the parameter's names",
+        }
+    }
+}
+
+impl fmt::Display for SettingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.reason())
+    }
+}
+
+impl core::error::Error for SettingError {}
+
+impl<T: Real + FromStr> Scenario<T> {
+    /// Takes one setting: `preset=NAME`, which replaces everything before it, or `section.name=value`. The value's range is
+    /// not checked here but by [`validate`](Self::validate), once all settings are in.
+    ///
+    /// # Errors
+    /// If there is no such parameter, or the value is not one for it.
+    ///
+    /// ```
+    /// use shared_model::{Scenario, settings::SettingError};
+    /// let mut scenario = Scenario::<f32>::reconstruction();
+    /// scenario.apply("run.wheel_speed_rpm=1600").unwrap();
+    /// assert_eq!(scenario.run.wheel_speed_rpm, 1600.0);
+    /// scenario.apply("dither.waveform=square").unwrap();
+    /// assert_eq!(scenario.apply("vehicle.mas_kg=1"), Err(SettingError::UnknownKey));
+    /// ```
+    pub fn apply(&mut self, setting: &str) -> Result<(), SettingError> {
+        let (key, value) = setting.split_once('=').ok_or(SettingError::NoEqualsSign)?;
+        match key {
+            "preset" => Ok(*self = Self::preset(choice(value)?)),
+            "vehicle.slip_form" => choose(&mut self.vehicle.slip_form, value),
+            "tires.model" => choose(&mut self.tires.model, value),
+            "friction.law" => choose(&mut self.friction.law, value),
+            "friction.dithered" => choose(&mut self.friction.dithered, value),
+            "dither.waveform" => choose(&mut self.dither.waveform, value),
+            "dither.application" => choose(&mut self.dither.application, value),
+            _ => self.set_number(key, value),
+        }
+    }
+
+    fn set_number(&mut self, key: &str, value: &str) -> Result<(), SettingError> {
+        let (section, name) = key.rsplit_once('.').ok_or(SettingError::UnknownKey)?;
+        let number = value.parse().map_err(|_| SettingError::NotANumber)?;
+        let known = match section {
+            "vehicle" => self.vehicle.set(name, number),
+            "tires.front" => self.tires.front.set(name, number),
+            "tires.rear" => self.tires.rear.set(name, number),
+            "steering" => self.steering.set(name, number),
+            "friction" => self.friction.set(name, number),
+            "dither" => self.dither.set(name, number),
+            "servo" => self.servo.set(name, number),
+            "run" => self.run.set(name, number),
+            _ => false,
+        };
+        if known {
+            Ok(())
+        } else {
+            Err(SettingError::UnknownKey)
+        }
+    }
+}
+
+fn choice<C: Choice>(value: &str) -> Result<C, SettingError> {
+    C::from_name(value).ok_or(SettingError::UnknownChoice)
+}
+
+fn choose<C: Choice>(place: &mut C, value: &str) -> Result<(), SettingError> {
+    *place = choice(value)?;
+    Ok(())
+}

@@ -1,0 +1,232 @@
+//! Tyres: cornering force against slip angle.
+//!
+//! The sign is the paper's: D > 0, so that the force has the sign of the slip angle and its cubic term bounds it.
+
+use crate::Real;
+use crate::dither::{Injection, SineMean};
+use crate::parameter::{Field, ParameterSet};
+
+/// The Magic Formula's coefficients for one axle, equations (6) and (7).
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct MagicFormula<T> {
+    /// Stiffness factor B, 1/rad.
+    pub stiffness_per_rad: T,
+    /// Shape factor C.
+    pub shape: T,
+    /// Peak force D, N.
+    pub peak_n: T,
+    /// Curvature factor E.
+    pub curvature: T,
+}
+
+impl<T: Real> MagicFormula<T> {
+    /// Cornering force at slip angle `alpha` (rad), N:
+    /// F = D sin(C atan(B (1 - E) alpha + E atan(B alpha))), equations (6) and (7).
+    ///
+    /// ```
+    /// let force = shared_model::tire::LOW_FRICTION_ROAD.0.force(0.1);
+    /// assert!((force - 2571.878_738_f64).abs() < 1e-6);
+    /// ```
+    pub fn force(&self, alpha: T) -> T {
+        let b_alpha = self.stiffness_per_rad * alpha;
+        let argument = b_alpha * (T::one() - self.curvature) + self.curvature * b_alpha.atan();
+        self.peak_n * (self.shape * argument.atan()).sin()
+    }
+
+    /// The cubic tyre with the same first and third derivative at zero slip, equations (8) and (9).
+    ///
+    /// k1 = B C D, k2 = D E C B^3/3 + D C B^3/3 + D (C B)^3/6.
+    ///
+    /// ```
+    /// let front = shared_model::tire::LOW_FRICTION_ROAD.0.cubic();
+    /// assert!((front.linear_n_per_rad - 45_286.398_f64).abs() < 1e-3);
+    /// assert!((front.cubic_n_per_rad3 - 417_962.679_f64).abs() < 1e-3);
+    /// ```
+    pub fn cubic(&self) -> CubicTire<T> {
+        let third = T::from_f64(1.0 / 3.0);
+        let sixth = T::from_f64(1.0 / 6.0);
+        let (b, c, d) = (self.stiffness_per_rad, self.shape, self.peak_n);
+        let b_cubed = b * b * b;
+        CubicTire {
+            linear_n_per_rad: b * c * d,
+            cubic_n_per_rad3: d * c * b_cubed * third * (self.curvature + T::one())
+                + d * c * c * c * b_cubed * sixth,
+        }
+    }
+
+    /// The same coefficients in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> MagicFormula<U> {
+        MagicFormula {
+            stiffness_per_rad: f(self.stiffness_per_rad),
+            shape: f(self.shape),
+            peak_n: f(self.peak_n),
+            curvature: f(self.curvature),
+        }
+    }
+}
+
+/// Coefficients of Table 1: front and rear axle.
+pub type Road = (MagicFormula<f64>, MagicFormula<f64>);
+
+/// Set A of Table 1. The table calls it the high-friction road, but (D_f + D_r)/(m g) is 0.29: this is the low-friction
+/// road that the paper's results are about.
+pub const LOW_FRICTION_ROAD: Road = (
+    MagicFormula {
+        stiffness_per_rad: 11.275,
+        shape: 1.56,
+        peak_n: 2574.7,
+        curvature: -1.999,
+    },
+    MagicFormula {
+        stiffness_per_rad: 18.631,
+        shape: 1.56,
+        peak_n: 1749.7,
+        curvature: -1.7908,
+    },
+);
+
+/// Set B of Table 1, (D_f + D_r)/(m g) = 0.81. Its front tyre's cubic coefficient is negative: with the cubic tyre the
+/// motion diverges.
+pub const HIGH_FRICTION_ROAD: Road = (
+    MagicFormula {
+        stiffness_per_rad: 6.7651,
+        shape: 1.3,
+        peak_n: 6436.8,
+        curvature: -1.999,
+    },
+    MagicFormula {
+        stiffness_per_rad: 9.0051,
+        shape: 1.3,
+        peak_n: 5430.0,
+        curvature: -1.7908,
+    },
+);
+
+/// The cubic tyre, equations (8) and (9): F = k1 alpha - k2 alpha^3.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CubicTire<T> {
+    /// Cornering stiffness k1 (k3 at the rear), N/rad.
+    pub linear_n_per_rad: T,
+    /// Cubic coefficient k2 (k4 at the rear), N/rad^3.
+    pub cubic_n_per_rad3: T,
+}
+
+impl<T: Real> CubicTire<T> {
+    /// Cornering force at slip angle `alpha` (rad), N.
+    ///
+    /// ```
+    /// use shared_model::tire::CubicTire;
+    /// let tire = CubicTire { linear_n_per_rad: 10.0, cubic_n_per_rad3: 100.0 };
+    /// assert_eq!(tire.force(0.5), -7.5);
+    /// ```
+    pub fn force(&self, alpha: T) -> T {
+        alpha * (self.linear_n_per_rad - self.cubic_n_per_rad3 * alpha * alpha)
+    }
+
+    /// The tyre that a dithered slip angle meets on average. The mean of the cube under a zero-mean dither of mean square
+    /// W^2 (square) or W^2/2 (sine) adds 3 k2 alpha times that to the linear term, so the mean is a cubic tyre again:
+    /// (21) gives k1 - 3 k2 W^2, (23) gives k1 - 1.5 k2 W^2.
+    ///
+    /// ```
+    /// use shared_model::tire::CubicTire;
+    /// let tire = CubicTire { linear_n_per_rad: 10.0, cubic_n_per_rad3: 100.0 };
+    /// // Dither of amplitude 0.1 rad: mean square 0.01 rad^2.
+    /// assert_eq!(tire.softened(0.01).linear_n_per_rad, 7.0);
+    /// ```
+    pub fn softened(&self, mean_square_rad2: T) -> Self {
+        let three = T::from_f64(3.0);
+        Self {
+            linear_n_per_rad: self.linear_n_per_rad
+                - three * self.cubic_n_per_rad3 * mean_square_rad2,
+            ..*self
+        }
+    }
+}
+
+/// Which tyre the model uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum TireModel {
+    /// Equations (8) and (9).
+    Cubic,
+    /// Equations (6) and (7).
+    MagicFormula,
+}
+
+/// Front or rear axle's tyres, ready to be evaluated.
+#[derive(Debug, Clone, Copy)]
+pub enum Tire<T> {
+    /// Equations (8) and (9).
+    Cubic(CubicTire<T>),
+    /// Equations (6) and (7).
+    MagicFormula(MagicFormula<T>, SineMean<T>),
+}
+
+impl<T: Real> Tire<T> {
+    /// The tyre of the given model and coefficients.
+    pub fn new(model: TireModel, coefficients: &MagicFormula<T>) -> Self {
+        match model {
+            TireModel::Cubic => Self::Cubic(coefficients.cubic()),
+            TireModel::MagicFormula => Self::MagicFormula(*coefficients, SineMean::new()),
+        }
+    }
+
+    /// Cornering force (N) at slip angle `alpha` (rad), with the dither ahead of the nonlinearity: closed form for the
+    /// cubic tyre, quadrature of (23) for the Magic Formula.
+    pub fn force(&self, alpha: T, injection: Injection<T>) -> T {
+        match self {
+            Self::Cubic(tire) => match injection {
+                Injection::Off => tire.force(alpha),
+                Injection::Shift { offset } => tire.force(alpha + offset),
+                Injection::SquareMean { amplitude } => {
+                    tire.softened(amplitude * amplitude).force(alpha)
+                }
+                Injection::SineMean { amplitude } => tire
+                    .softened(T::from_f64(0.5) * amplitude * amplitude)
+                    .force(alpha),
+            },
+            Self::MagicFormula(tire, mean) => match injection {
+                Injection::Off => tire.force(alpha),
+                Injection::Shift { offset } => tire.force(alpha + offset),
+                Injection::SquareMean { amplitude } => {
+                    T::from_f64(0.5) * (tire.force(alpha + amplitude) + tire.force(alpha - amplitude))
+                }
+                Injection::SineMean { amplitude } => mean.of(|a| tire.force(a), alpha, amplitude),
+            },
+        }
+    }
+}
+
+impl<T: Real> ParameterSet<T> for MagicFormula<T> {
+    const SECTION: &'static str = "tire";
+    const FIELDS: &'static [Field<Self, T>] = &[
+        Field {
+            name: "stiffness_per_rad",
+            min: 0.1,
+            max: 100.0,
+            place: |p| &mut p.stiffness_per_rad,
+        },
+        Field {
+            name: "shape",
+            min: 0.1,
+            max: 10.0,
+            place: |p| &mut p.shape,
+        },
+        // Negative: the usual vehicle sign, which diverges here but may be asked for.
+        Field {
+            name: "peak_n",
+            min: -1e6,
+            max: 1e6,
+            place: |p| &mut p.peak_n,
+        },
+        Field {
+            name: "curvature",
+            min: -100.0,
+            max: 1.0,
+            place: |p| &mut p.curvature,
+        },
+    ];
+}

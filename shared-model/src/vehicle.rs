@@ -1,0 +1,320 @@
+//! The vehicle: lateral, yaw and steering motion at constant speed, equation (14).
+
+use crate::dither::Injection;
+use crate::friction::{Friction, FrictionLaw, FrictionMode, Sign};
+use crate::parameter::{Field, ParameterSet};
+use crate::tire::Tire;
+use crate::{Real, Scenario};
+use nalgebra::Vector4;
+
+/// Index of the sideslip angle beta (rad) in a state vector.
+pub const SIDESLIP: usize = 0;
+/// Index of the yaw rate gamma (rad/s) in a state vector.
+pub const YAW_RATE: usize = 1;
+/// Index of the front steering angle delta_f (rad) in a state vector.
+pub const STEERING_ANGLE: usize = 2;
+/// Index of the steering rate (rad/s) in a state vector.
+pub const STEERING_RATE: usize = 3;
+
+/// Form of the slip angles and of the yaw moment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum SlipForm {
+    /// Second lines of (4) and (5); yaw moment without cos(beta), as in (14).
+    SmallAngle,
+    /// First lines of (4) and (5); yaw moment with cos(beta), as in (3).
+    Exact,
+}
+
+/// Parameters of the chassis, Table 2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Vehicle<T> {
+    /// Form of the slip angles.
+    pub slip_form: SlipForm,
+    /// Mass m, kg.
+    pub mass_kg: T,
+    /// Yaw moment of inertia I_z, kg m^2.
+    pub yaw_inertia_kg_m2: T,
+    /// Distance l_f from the centre of gravity to the front axle, m.
+    pub front_axle_distance_m: T,
+    /// Distance l_r from the centre of gravity to the rear axle, m.
+    pub rear_axle_distance_m: T,
+    /// Wheel radius R, m (the paper's is in cm).
+    pub wheel_radius_m: T,
+}
+
+impl<T: Real> Vehicle<T> {
+    /// Speed v = 2 pi R N/60, m/s, at the wheel speed N, equation (2).
+    ///
+    /// ```
+    /// let vehicle = shared_model::Scenario::reconstruction().vehicle;
+    /// assert!((vehicle.speed_m_per_s(1750.0) - 54.977_871_437_f64).abs() < 1e-9);
+    /// ```
+    pub fn speed_m_per_s(&self, wheel_speed_rpm: T) -> T {
+        T::from_f64(core::f64::consts::TAU / 60.0) * self.wheel_radius_m * wheel_speed_rpm
+    }
+
+    /// The same parameters in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Vehicle<U> {
+        Vehicle {
+            slip_form: self.slip_form,
+            mass_kg: f(self.mass_kg),
+            yaw_inertia_kg_m2: f(self.yaw_inertia_kg_m2),
+            front_axle_distance_m: f(self.front_axle_distance_m),
+            rear_axle_distance_m: f(self.rear_axle_distance_m),
+            wheel_radius_m: f(self.wheel_radius_m),
+        }
+    }
+}
+
+impl<T: Real> ParameterSet<T> for Vehicle<T> {
+    const SECTION: &'static str = "vehicle";
+    const FIELDS: &'static [Field<Self, T>] = &[
+        Field {
+            name: "mass_kg",
+            min: 1.0,
+            max: 1e5,
+            place: |p| &mut p.mass_kg,
+        },
+        Field {
+            name: "yaw_inertia_kg_m2",
+            min: 1.0,
+            max: 1e6,
+            place: |p| &mut p.yaw_inertia_kg_m2,
+        },
+        Field {
+            name: "front_axle_distance_m",
+            min: 0.01,
+            max: 20.0,
+            place: |p| &mut p.front_axle_distance_m,
+        },
+        Field {
+            name: "rear_axle_distance_m",
+            min: 0.01,
+            max: 20.0,
+            place: |p| &mut p.rear_axle_distance_m,
+        },
+        Field {
+            name: "wheel_radius_m",
+            min: 0.01,
+            max: 5.0,
+            place: |p| &mut p.wheel_radius_m,
+        },
+    ];
+}
+
+/// State of the model: the vector and the friction element's mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct State<T> {
+    /// [beta (rad), gamma (rad/s), delta_f (rad), delta_f' (rad/s)].
+    pub x: Vector4<T>,
+    /// Mode of the dry friction.
+    pub friction: FrictionMode,
+}
+
+impl<T: Real> State<T> {
+    /// The same state in another arithmetic.
+    pub fn map<U: Real>(&self, f: impl FnMut(T) -> U) -> State<U> {
+        State {
+            x: self.x.map(f),
+            friction: self.friction,
+        }
+    }
+}
+
+/// The right-hand side of (14) with its constants worked out for one scenario and wheel speed.
+#[derive(Debug, Clone, Copy)]
+pub struct Model<T> {
+    slip_form: SlipForm,
+    front: Tire<T>,
+    rear: Tire<T>,
+    /// l_f/v and l_r/v, s.
+    front_lever_s: T,
+    rear_lever_s: T,
+    /// 1/(m v).
+    lateral_gain: T,
+    /// l_f/I_z and l_r/I_z.
+    front_yaw_gain: T,
+    rear_yaw_gain: T,
+    motor_torque_nm: T,
+    trail_m: T,
+    damping_nm_s_per_rad: T,
+    inverse_steering_inertia: T,
+    friction: Friction<T>,
+    friction_limit_nm: T,
+    dither_frequency_rad_per_s: T,
+}
+
+impl<T: Real> Model<T> {
+    /// The model of a scenario, which must be valid.
+    pub fn new(scenario: &Scenario<T>) -> Self {
+        let (vehicle, steering) = (&scenario.vehicle, &scenario.steering);
+        let speed = vehicle.speed_m_per_s(scenario.run.wheel_speed_rpm);
+        Self {
+            slip_form: vehicle.slip_form,
+            front: Tire::new(scenario.tires.model, &scenario.tires.front),
+            rear: Tire::new(scenario.tires.model, &scenario.tires.rear),
+            front_lever_s: vehicle.front_axle_distance_m / speed,
+            rear_lever_s: vehicle.rear_axle_distance_m / speed,
+            lateral_gain: T::one() / (vehicle.mass_kg * speed),
+            front_yaw_gain: vehicle.front_axle_distance_m / vehicle.yaw_inertia_kg_m2,
+            rear_yaw_gain: vehicle.rear_axle_distance_m / vehicle.yaw_inertia_kg_m2,
+            motor_torque_nm: steering.motor_torque_nm(),
+            trail_m: steering.trail_m(),
+            damping_nm_s_per_rad: steering.damping_nm_s_per_rad,
+            inverse_steering_inertia: T::one() / steering.inertia_kg_m2,
+            friction: scenario.friction,
+            friction_limit_nm: scenario.friction.limit_nm(steering.pneumatic_trail_m),
+            dither_frequency_rad_per_s: scenario.dither.frequency_rad_per_s(),
+        }
+    }
+
+    /// The state in which a run of the scenario starts.
+    pub fn initial_state(&self, scenario: &Scenario<T>) -> State<T> {
+        let run = &scenario.run;
+        self.state(Vector4::new(
+            run.sideslip_rad,
+            run.yaw_rate_rad_per_s,
+            run.steering_angle_rad,
+            run.steering_rate_rad_per_s,
+        ))
+    }
+
+    /// The state with the given vector, its friction mode as it is without dither.
+    pub fn state(&self, x: Vector4<T>) -> State<T> {
+        State {
+            x,
+            friction: self.mode_at(&x, Injection::Off),
+        }
+    }
+
+    /// Slip angles of the front and rear tyres, rad, equations (4) and (5).
+    pub fn slip_angles(&self, x: &Vector4<T>) -> (T, T) {
+        let (beta, gamma, delta) = (x[SIDESLIP], x[YAW_RATE], x[STEERING_ANGLE]);
+        let (front, rear) = match self.slip_form {
+            SlipForm::SmallAngle => (self.front_lever_s * gamma, self.rear_lever_s * gamma),
+            SlipForm::Exact => {
+                let along = gamma * beta.cos();
+                (
+                    (self.front_lever_s * along).atan(),
+                    (self.rear_lever_s * along).atan(),
+                )
+            }
+        };
+        (beta + front - delta, beta - rear)
+    }
+
+    /// Cornering forces of the front and rear tyres, N, with the dither ahead of them.
+    pub fn cornering_forces(&self, x: &Vector4<T>, injection: Injection<T>) -> (T, T) {
+        let (front, rear) = self.slip_angles(x);
+        (
+            self.front.force(front, injection),
+            self.rear.force(rear, injection),
+        )
+    }
+
+    /// Torque on the steering at rest from motor and tyres, r_s tau_M - tau_a, N m.
+    pub fn driving_torque_nm(&self, x: &Vector4<T>, injection: Injection<T>) -> T {
+        let (front, _) = self.cornering_forces(x, injection);
+        self.motor_torque_nm - self.trail_m * front
+    }
+
+    /// Time derivative of the state vector, equation (14) with (24)'s effective nonlinearities, friction in `mode`.
+    pub fn derivative(
+        &self,
+        x: &Vector4<T>,
+        injection: Injection<T>,
+        mode: FrictionMode,
+    ) -> Vector4<T> {
+        let (gamma, rate) = (x[YAW_RATE], x[STEERING_RATE]);
+        let (front, rear) = self.cornering_forces(x, injection);
+        let yaw = self.front_yaw_gain * front - self.rear_yaw_gain * rear;
+        let acceleration = match mode {
+            FrictionMode::Sticking => T::zero(),
+            _ => {
+                let torque = self.motor_torque_nm
+                    - self.trail_m * front
+                    - self.damping_nm_s_per_rad * rate
+                    - self.friction_torque_nm(x, injection, mode);
+                torque * self.inverse_steering_inertia
+            }
+        };
+        Vector4::new(
+            (front + rear) * self.lateral_gain - gamma,
+            match self.slip_form {
+                SlipForm::SmallAngle => yaw,
+                SlipForm::Exact => yaw * x[SIDESLIP].cos(),
+            },
+            rate,
+            acceleration,
+        )
+    }
+
+    /// Argument of the friction law's sign function: steering rate, or steering angle in the printed law.
+    pub(crate) fn friction_argument(&self) -> usize {
+        match self.friction.law {
+            FrictionLaw::PrintedAngle => STEERING_ANGLE,
+            FrictionLaw::None | FrictionLaw::CoulombRate => STEERING_RATE,
+        }
+    }
+
+    /// The friction law's sign function under the dither.
+    pub(crate) fn friction_sign(&self, injection: Injection<T>) -> Sign<T> {
+        if self.friction.law == FrictionLaw::None {
+            return Sign::Zero;
+        }
+        Sign::new(
+            self.friction
+                .injection(injection, self.dither_frequency_rad_per_s),
+        )
+    }
+
+    /// The friction mode in which a step begins: at rest decided by the torques, else by the sign's argument.
+    pub(crate) fn mode_at(&self, x: &Vector4<T>, injection: Injection<T>) -> FrictionMode {
+        let argument = x[self.friction_argument()];
+        if self.can_stick() && argument == T::zero() {
+            self.mode_at_rest(x, injection)
+        } else {
+            self.friction_sign(injection).mode(argument)
+        }
+    }
+
+    /// The steering comes to rest and may stick: Coulomb friction whose sign function is not dithered.
+    pub(crate) fn can_stick(&self) -> bool {
+        self.friction.law == FrictionLaw::CoulombRate && !self.friction.dithered
+    }
+
+    /// The mode in which the steering leaves rest, or stays.
+    pub(crate) fn mode_at_rest(&self, x: &Vector4<T>, injection: Injection<T>) -> FrictionMode {
+        let torque = self.driving_torque_nm(x, injection);
+        if torque > self.friction_limit_nm {
+            FrictionMode::Positive
+        } else if torque < -self.friction_limit_nm {
+            FrictionMode::Negative
+        } else {
+            FrictionMode::Sticking
+        }
+    }
+
+    fn friction_torque_nm(
+        &self,
+        x: &Vector4<T>,
+        injection: Injection<T>,
+        mode: FrictionMode,
+    ) -> T {
+        match mode {
+            FrictionMode::Positive => self.friction_limit_nm,
+            FrictionMode::Negative => -self.friction_limit_nm,
+            FrictionMode::Sticking => T::zero(),
+            FrictionMode::Neutral => match self.friction_sign(injection) {
+                sign @ Sign::Smooth { .. } => {
+                    self.friction_limit_nm * sign.at(x[self.friction_argument()])
+                }
+                Sign::Stepped { .. } | Sign::Zero => T::zero(),
+            },
+        }
+    }
+}

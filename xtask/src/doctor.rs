@@ -1,0 +1,88 @@
+//! `cargo xtask doctor`: what is needed, what is there, what set-up would do.
+
+use anyhow::{Result, bail};
+
+use crate::setup::{qemu, target};
+use crate::{rustup, workspace};
+
+/// One thing that is needed.
+struct Item {
+    need: String,
+    /// What is there, or else what brings it.
+    state: Result<String, String>,
+}
+
+/// Prints the table; an error if something is missing.
+pub fn run() -> Result<()> {
+    let items = [toolchain()?, target()?, qemu(), runner()?];
+    let width = items
+        .iter()
+        .map(|item| item.need.len())
+        .max()
+        .unwrap_or_default();
+    for Item { need, state } in &items {
+        match state {
+            Ok(found) => println!("ok       {need:width$}  {found}"),
+            Err(cure) => println!("MISSING  {need:width$}  {cure}"),
+        }
+    }
+    let missing = items.iter().filter(|item| item.state.is_err()).count();
+    if missing > 0 {
+        bail!(
+            "{missing} of {} missing: run `cargo xtask setup`",
+            items.len()
+        );
+    }
+    println!("everything is there");
+    Ok(())
+}
+
+fn toolchain() -> Result<Item> {
+    let pinned = workspace::pinned_channel()?;
+    let found = rustup::rustc_version(&pinned);
+    let cure = || match rustup::rustup() {
+        Ok(_) => format!("not by set-up: type `rustup toolchain install {pinned}`"),
+        Err(error) => error.to_string(),
+    };
+    Ok(Item {
+        need: format!("Rust {pinned}"),
+        state: found.ok_or_else(cure),
+    })
+}
+
+fn target() -> Result<Item> {
+    let pinned = workspace::pinned_channel()?;
+    let state = if rustup::rustc_version(&pinned).is_none() {
+        Err(format!("needs Rust {pinned} first"))
+    } else {
+        match target::toolchain(&pinned)? {
+            Some(toolchain) => Ok(format!("builds with toolchain {toolchain}")),
+            None => Err(format!("set-up would: {}", target::plan(&pinned)?)),
+        }
+    };
+    Ok(Item {
+        need: target::TARGET.to_owned(),
+        state,
+    })
+}
+
+fn qemu() -> Item {
+    let state = match qemu::found() {
+        Some((path, version)) => Ok(format!("{version}, {}", path.display())),
+        None => Err(qemu::plan()),
+    };
+    Item {
+        need: qemu::PROGRAM.to_owned(),
+        state,
+    }
+}
+
+fn runner() -> Result<Item> {
+    let path = workspace::sim_host()?;
+    let found = path.is_file().then(|| path.display().to_string());
+    let cure = || "set-up would: `cargo build --release --package sim-host`".to_owned();
+    Ok(Item {
+        need: "runner sim-host".to_owned(),
+        state: found.ok_or_else(cure),
+    })
+}

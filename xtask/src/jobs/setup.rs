@@ -1,0 +1,18 @@
+//! `cargo xtask setup`.
+
+use anyhow::Result;
+
+use super::{build_sim_host, stage};
+use crate::{setup, workspace};
+
+/// Installs what is missing and builds the runner.
+pub fn run() -> Result<()> {
+    let toolchain = stage("set-up", setup::tools)?;
+    stage("runner", build_sim_host)?;
+    println!(
+        "the firmware builds with toolchain {toolchain}; its runner is {}",
+        workspace::sim_host()?.display()
+    );
+    println!("set-up is complete");
+    Ok(())
+}

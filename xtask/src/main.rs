@@ -1,0 +1,93 @@
+//! The single door to the repository: `cargo xtask <command>`.
+//!
+//! It sets up what is missing, builds, and starts programs. It knows no model: every verdict is the business of
+//! the program it starts.
+
+mod doctor;
+mod firmware;
+mod host;
+mod jobs;
+mod outcome;
+mod process;
+mod rustup;
+mod setup;
+mod workspace;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// Sets up, builds, tests and runs Dithersteer.
+///
+/// Exit codes of every command: 0 all is well; 1 a test or a verdict failed; 2 it could not run.
+/// The last line says why, and what to do next.
+#[derive(Parser)]
+#[command(
+    name = "cargo xtask",
+    bin_name = "cargo xtask",
+    arg_required_else_help = true
+)]
+#[command(
+    after_help = "Examples:\n  cargo xtask demo     set up, build, run the firmware in QEMU, write the report\n  \
+                        cargo xtask test     set up, build, run every test\n  \
+                        cargo xtask doctor   what is there, what is missing\n\n\
+                        `cargo xtask help COMMAND` shows a command's own examples."
+)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Shows what is needed, what is there, and what `setup` would do; changes nothing.
+    ///
+    /// Exit code 0 when everything is there, 2 when something is missing.
+    #[command(after_help = "Example:\n  cargo xtask doctor")]
+    Doctor,
+
+    /// Installs what is missing, nothing twice, and builds the runner.
+    ///
+    /// Says what it installs, and where, before it does it. The compiler's target comes from rustup, or where
+    /// rustup cannot download, from Debian's Rust packages; QEMU comes from the system's packages. The runner is
+    /// the program that `cargo run` in firmware/ starts.
+    #[command(
+        after_help = "Example:\n  cargo xtask setup && cd firmware && cargo run --profile firmware --bin ecu"
+    )]
+    Setup,
+
+    /// Sets up, builds, runs firmware and host against each other, and writes target/report/index.html.
+    #[command(after_help = "Examples:\n  cargo xtask demo\n  \
+                            cargo xtask demo -- --help   the options that may follow the two dashes")]
+    Demo {
+        /// Arguments passed on to `sim-host verify`.
+        #[arg(last = true)]
+        args: Vec<String>,
+    },
+
+    /// Sets up, builds the firmware with its proofs, and runs every test; stops at the first failure.
+    #[command(after_help = "Example:\n  cargo xtask test")]
+    Test,
+
+    /// Checks the format, and runs clippy on host and firmware; warnings are errors.
+    #[command(after_help = "Example:\n  cargo xtask lint")]
+    Lint,
+
+    /// Builds the firmware; its last line of output is the path of the ELF file.
+    #[command(
+        after_help = "Example:\n  cargo xtask firmware && arm-none-eabi-size \"$(cargo xtask firmware | tail -n 1)\""
+    )]
+    Firmware,
+}
+
+fn main() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Doctor => doctor::run(),
+        Command::Setup => jobs::setup::run(),
+        Command::Demo { args } => jobs::demo::run(&args),
+        Command::Test => jobs::test::run(),
+        Command::Lint => jobs::lint::run(),
+        Command::Firmware => jobs::firmware::run(),
+    };
+    outcome::report(result)
+}
