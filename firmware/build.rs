@@ -11,8 +11,12 @@ fn main() {
     println!("cargo:rerun-if-changed={map}");
     println!("cargo:rerun-if-changed=../memory.x");
     println!("cargo:rustc-link-search={}", out.display());
-    for argument in ["--nmagic", "-Tlink.x", "-Tdefmt.x"] {
+    for argument in ["--nmagic", "-Tlink.x"] {
         println!("cargo:rustc-link-arg-bins={argument}");
+    }
+    // Not for `panic-free`: defmt's script keeps its panic handler in the image, reachable or not.
+    for image in ["ecu", "fault-drill"] {
+        println!("cargo:rustc-link-arg-bin={image}=-Tdefmt.x");
     }
     // Without a level at build time, defmt drops everything below errors.
     println!("cargo:rustc-env=DEFMT_LOG=info");

@@ -60,6 +60,10 @@ impl HostFile {
     pub fn write(self, bytes: &[u8]) -> Result<(), HostFileError> {
         // SAFETY: the operation reads bytes.len() bytes.
         let left = unsafe { syscall!(WRITE, self.handle, bytes.as_ptr(), bytes.len()) };
-        if left == 0 { Ok(()) } else { Err(HostFileError) }
+        if left == 0 {
+            Ok(())
+        } else {
+            Err(HostFileError)
+        }
     }
 }

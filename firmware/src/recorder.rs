@@ -18,7 +18,8 @@ const DUTY_RING: usize = 1024;
 const CHUNK_BYTES: usize = 4096;
 const NOT_OPEN: usize = usize::MAX;
 
-static RECORDED: Mutex<Cell<Option<Producer<'static, u16>>>> = Mutex::new(Cell::new(None));
+static RECORDED: Mutex<Cell<Option<Producer<'static, u16, DUTY_RING>>>> =
+    Mutex::new(Cell::new(None));
 static FILE: AtomicUsize = AtomicUsize::new(NOT_OPEN);
 static RECORDS: AtomicU32 = AtomicU32::new(0);
 static OVERRUNS: AtomicU32 = AtomicU32::new(0);
@@ -34,7 +35,7 @@ pub fn overruns() -> u32 {
 }
 
 /// Where a PWM that records puts its duty codes.
-pub struct DutyRecording(Producer<'static, u16>);
+pub struct DutyRecording(Producer<'static, u16, DUTY_RING>);
 
 impl DutyRecording {
     /// Records a code; counts an overrun if the ring is full.
@@ -51,7 +52,7 @@ pub fn take_duty_recording() -> Option<DutyRecording> {
 }
 
 /// The control task's end of its ring.
-pub struct RecordProducer(Producer<'static, Record>);
+pub struct RecordProducer(Producer<'static, Record, RECORD_RING>);
 
 impl RecordProducer {
     /// Passes a record on; counts an overrun if the ring is full.
@@ -64,8 +65,8 @@ impl RecordProducer {
 
 /// The main loop's end: takes records and duty codes from the rings and writes them to the host in chunks.
 pub struct Recorder {
-    records: Consumer<'static, Record>,
-    duties: Consumer<'static, u16>,
+    records: Consumer<'static, Record, RECORD_RING>,
+    duties: Consumer<'static, u16, DUTY_RING>,
     samples_per_step: u16,
     file: Option<HostFile>,
     chunk: &'static mut [u8; CHUNK_BYTES],

@@ -13,7 +13,10 @@ unsafe extern "C" {
 }
 
 fn bounds() -> (usize, usize) {
-    (&raw const __sheap as usize, &raw const _stack_start as usize)
+    (
+        &raw const __sheap as usize,
+        &raw const _stack_start as usize,
+    )
 }
 
 /// Paints the free RAM below the present stack.

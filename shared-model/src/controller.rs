@@ -83,6 +83,11 @@ impl<T: Real> ControlTask<T> {
         &self.state
     }
 
+    /// Goes on from another state: for comparing single steps, and for carrying tangents along a recorded motion.
+    pub fn set_state(&mut self, state: State<T>) {
+        self.state = state;
+    }
+
     /// The present state.
     pub fn state(&self) -> &State<T> {
         &self.state

@@ -191,21 +191,26 @@ pub enum Injection<T> {
     },
 }
 
+impl<T> Injection<T> {
+    /// The same dither in another arithmetic.
+    pub fn map<U>(self, f: impl Fn(T) -> U) -> Injection<U> {
+        match self {
+            Self::Off => Injection::Off,
+            Self::SquareMean { amplitude } => Injection::SquareMean {
+                amplitude: f(amplitude),
+            },
+            Self::SineMean { amplitude } => Injection::SineMean {
+                amplitude: f(amplitude),
+            },
+            Self::Shift { offset } => Injection::Shift { offset: f(offset) },
+        }
+    }
+}
+
 impl<T: Real> Injection<T> {
     /// The same dither of another amplitude: `factor` times this one's.
     pub fn scaled(self, factor: T) -> Self {
-        match self {
-            Self::Off => Self::Off,
-            Self::SquareMean { amplitude } => Self::SquareMean {
-                amplitude: factor * amplitude,
-            },
-            Self::SineMean { amplitude } => Self::SineMean {
-                amplitude: factor * amplitude,
-            },
-            Self::Shift { offset } => Self::Shift {
-                offset: factor * offset,
-            },
-        }
+        self.map(|amplitude| factor * amplitude)
     }
 }
 

@@ -48,7 +48,7 @@ pub fn step<T: Real>(model: &Model<T>, state: &mut State<T>, step_s: T, injectio
     let fraction = (threshold - before) / (trial[argument] - before);
     let mut at = runge_kutta_4(model, &state.x, step_s * fraction, injection, mode);
     at[argument] = threshold;
-    let mode = if model.can_stick() {
+    let mode = if model.can_stick(injection) {
         model.mode_at_rest(&at, injection)
     } else {
         behind

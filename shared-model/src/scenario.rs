@@ -333,7 +333,8 @@ impl<T: Real> Scenario<T> {
     }
 
     fn steps_until(&self, time_s: T) -> u32 {
-        (time_s * self.model_rate_hz() + T::from_f64(0.5)).to_u32()
+        // In f64 whatever T is: f32 has no halves from 2^23 steps on.
+        (time_s.to_f64() * self.model_rate_hz().to_f64() + 0.5) as u32
     }
 
     /// PWM samples in a model step.

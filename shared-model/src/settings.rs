@@ -115,7 +115,7 @@ impl<T: Real + FromStr> Scenario<T> {
     pub fn apply(&mut self, setting: &str) -> Result<(), SettingError> {
         let (key, value) = setting.split_once('=').ok_or(SettingError::NoEqualsSign)?;
         match key {
-            "preset" => Ok(*self = Self::preset(choice(value)?)),
+            "preset" => choice(value).map(|preset| *self = Self::preset(preset)),
             "vehicle.slip_form" => choose(&mut self.vehicle.slip_form, value),
             "tires.model" => choose(&mut self.tires.model, value),
             "friction.law" => choose(&mut self.friction.law, value),
@@ -128,23 +128,27 @@ impl<T: Real + FromStr> Scenario<T> {
 
     fn set_number(&mut self, key: &str, value: &str) -> Result<(), SettingError> {
         let (section, name) = key.rsplit_once('.').ok_or(SettingError::UnknownKey)?;
-        let number = value.parse().map_err(|_| SettingError::NotANumber)?;
+        let parsed = value.parse();
+        // The key is looked at first: a misspelt choice, whose value is no number, is an unknown key all the same.
+        let mut changed = *self;
+        let number = parsed.as_ref().map_or(T::zero(), |&number| number);
         let known = match section {
-            "vehicle" => self.vehicle.set(name, number),
-            "tires.front" => self.tires.front.set(name, number),
-            "tires.rear" => self.tires.rear.set(name, number),
-            "steering" => self.steering.set(name, number),
-            "friction" => self.friction.set(name, number),
-            "dither" => self.dither.set(name, number),
-            "servo" => self.servo.set(name, number),
-            "run" => self.run.set(name, number),
+            "vehicle" => changed.vehicle.set(name, number),
+            "tires.front" => changed.tires.front.set(name, number),
+            "tires.rear" => changed.tires.rear.set(name, number),
+            "steering" => changed.steering.set(name, number),
+            "friction" => changed.friction.set(name, number),
+            "dither" => changed.dither.set(name, number),
+            "servo" => changed.servo.set(name, number),
+            "run" => changed.run.set(name, number),
             _ => false,
         };
-        if known {
-            Ok(())
-        } else {
-            Err(SettingError::UnknownKey)
+        if !known {
+            return Err(SettingError::UnknownKey);
         }
+        parsed.map_err(|_| SettingError::NotANumber)?;
+        *self = changed;
+        Ok(())
     }
 }
 

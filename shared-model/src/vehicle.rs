@@ -275,16 +275,18 @@ impl<T: Real> Model<T> {
     /// The friction mode in which a step begins: at rest decided by the torques, else by the sign's argument.
     pub(crate) fn mode_at(&self, x: &Vector4<T>, injection: Injection<T>) -> FrictionMode {
         let argument = x[self.friction_argument()];
-        if self.can_stick() && argument == T::zero() {
+        if argument == T::zero() && self.can_stick(injection) {
             self.mode_at_rest(x, injection)
         } else {
             self.friction_sign(injection).mode(argument)
         }
     }
 
-    /// The steering comes to rest and may stick: Coulomb friction whose sign function is not dithered.
-    pub(crate) fn can_stick(&self) -> bool {
-        self.friction.law == FrictionLaw::CoulombRate && !self.friction.dithered
+    /// The steering comes to rest and may stick: Coulomb friction whose sign function is not dithered, or not yet.
+    pub(crate) fn can_stick(&self, injection: Injection<T>) -> bool {
+        let (lower, upper) = (T::zero(), T::zero());
+        self.friction.law == FrictionLaw::CoulombRate
+            && self.friction_sign(injection) == Sign::Stepped { lower, upper }
     }
 
     /// The mode in which the steering leaves rest, or stays.

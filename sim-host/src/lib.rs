@@ -1,1 +1,22 @@
+//! Host side of the steering ECU: the same model in f64, the firmware in QEMU, and the comparison of the two.
+//!
+//! | question | module |
+//! |---|---|
+//! | how does a scenario move? | [`simulate`] |
+//! | is a motion chaotic, or which period has it? | [`chaos`] |
+//! | how is the firmware run? | [`pil`] |
+//! | do firmware and host agree? | [`equivalence`] |
+//! | what does a whole verification do? | [`verify`] |
+//! | how are configurations read? | [`config`] |
+//! | how are results shown? | [`report`], [`verdict`] |
 
+pub mod chaos;
+pub mod config;
+pub mod engine;
+pub mod equivalence;
+pub mod pil;
+pub mod report;
+pub mod simulate;
+pub mod trace;
+pub mod verdict;
+pub mod verify;

@@ -1,0 +1,4 @@
+//! Measures of chaos: the largest Lyapunov exponent and the period.
+
+pub mod lyapunov;
+pub mod period;

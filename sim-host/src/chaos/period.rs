@@ -1,0 +1,122 @@
+//! Period of a motion, counted in local maxima of the yaw rate: what the paper's bifurcation diagrams show.
+
+use crate::trace::Trace;
+use shared_model::vehicle::YAW_RATE;
+
+/// Highest period that is told from chaos.
+const MAX_PERIOD: usize = 16;
+/// Repetitions of the cycle that must be seen.
+const MIN_REPETITIONS: usize = 3;
+/// Maxima count as equal when they differ by at most this share of the yaw rate's range.
+const TOLERANCE: f64 = 2e-3;
+/// A yaw rate that varies by less than this is at rest, rad/s.
+const AT_REST_RAD_PER_S: f64 = 1e-6;
+
+/// What a motion's maxima say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Period {
+    /// No motion.
+    Equilibrium,
+    /// The maxima repeat after `maxima` of them, to `residual` of the yaw rate's range; the cycle takes `time_s`.
+    Periodic {
+        /// Maxima in a cycle: period-n.
+        maxima: usize,
+        /// Greatest difference of maxima one cycle apart, over the yaw rate's range.
+        residual: f64,
+        /// Mean time of a cycle, s.
+        time_s: f64,
+        /// Greatest deviation of a cycle's time from the mean, s.
+        time_spread_s: f64,
+    },
+    /// No repetition up to period 16; `residual` is the least one found.
+    Aperiodic {
+        /// Least over the periods tried of the greatest difference, over the yaw rate's range.
+        residual: f64,
+    },
+    /// Fewer maxima than a judgement needs.
+    TooShort {
+        /// Maxima seen.
+        maxima: usize,
+    },
+}
+
+impl Period {
+    /// The number of maxima in a cycle, if there is a cycle.
+    pub fn maxima(&self) -> Option<usize> {
+        match self {
+            Self::Periodic { maxima, .. } => Some(*maxima),
+            _ => None,
+        }
+    }
+}
+
+impl std::fmt::Display for Period {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Equilibrium => f.write_str("equilibrium"),
+            Self::Periodic {
+                maxima, time_s, ..
+            } => write!(f, "period-{maxima} (cycle {time_s:.4} s)"),
+            Self::Aperiodic { .. } => write!(f, "no period up to {MAX_PERIOD}"),
+            Self::TooShort { maxima } => write!(f, "too short: {maxima} maxima"),
+        }
+    }
+}
+
+/// Time (s) and height (rad/s) of each local maximum of the yaw rate from state index `from` on, each from the parabola
+/// through its three highest samples.
+pub fn yaw_rate_maxima(trace: &Trace, from: usize) -> Vec<(f64, f64)> {
+    let gamma: Vec<f64> = trace.component(YAW_RATE).skip(from).collect();
+    let peak = |(k, w): (usize, &[f64])| {
+        let (left, top, right) = (w[0], w[1], w[2]);
+        if !(left < top && top >= right) {
+            return None;
+        }
+        let curvature = left - 2.0 * top + right;
+        let offset = 0.5 * (left - right) / curvature;
+        let height = top - 0.25 * (left - right) * offset;
+        Some((trace.time_s(from + k + 1) + offset * trace.step_s, height))
+    };
+    gamma.windows(3).enumerate().filter_map(peak).collect()
+}
+
+/// Period of the motion from state index `from` on.
+pub fn period(trace: &Trace, from: usize) -> Period {
+    let (low, high) = trace.range(YAW_RATE, from);
+    if high - low < AT_REST_RAD_PER_S {
+        return Period::Equilibrium;
+    }
+    let maxima = yaw_rate_maxima(trace, from);
+    if maxima.len() < MIN_REPETITIONS + 1 {
+        return Period::TooShort {
+            maxima: maxima.len(),
+        };
+    }
+    let mut least = f64::INFINITY;
+    for n in 1..=MAX_PERIOD.min(maxima.len() / (MIN_REPETITIONS + 1)) {
+        let residual = residual(&maxima, n) / (high - low);
+        if residual <= TOLERANCE {
+            let (time_s, time_spread_s) = cycle_time(&maxima, n);
+            return Period::Periodic {
+                maxima: n,
+                residual,
+                time_s,
+                time_spread_s,
+            };
+        }
+        least = least.min(residual);
+    }
+    Period::Aperiodic { residual: least }
+}
+
+fn residual(maxima: &[(f64, f64)], n: usize) -> f64 {
+    let pairs = maxima.iter().zip(&maxima[n..]);
+    pairs.map(|(a, b)| (a.1 - b.1).abs()).fold(0.0, f64::max)
+}
+
+fn cycle_time(maxima: &[(f64, f64)], n: usize) -> (f64, f64) {
+    let times: Vec<f64> = maxima.iter().zip(&maxima[n..]).map(|(a, b)| b.0 - a.0).collect();
+    let mean = times.iter().sum::<f64>() / times.len() as f64;
+    let spread = times.iter().map(|t| (t - mean).abs()).fold(0.0, f64::max);
+    (mean, spread)
+}

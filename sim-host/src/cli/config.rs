@@ -1,0 +1,22 @@
+//! `sim-host config`: the complete configuration.
+
+use super::{ConfigOptions, Done};
+use sim_host::config::{to_toml, validate};
+
+/// Print a complete configuration as TOML, checked. Names carry their units.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host config > vehicle.toml                    all parameters of the paper's vehicle, to be edited
+  sim-host config --preset printed                  the equations as printed
+  sim-host config --config vehicle.toml             check a file and print it completed")]
+pub struct Arguments {
+    #[command(flatten)]
+    config: ConfigOptions,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenario = arguments.config.load()?;
+    validate(&scenario)?;
+    print!("{}", to_toml(&scenario));
+    Ok(Done::Well)
+}

@@ -1,0 +1,152 @@
+//! One file a subcommand, and what they share: exit codes, configuration options, output files.
+
+mod config;
+mod decode;
+mod output;
+mod qemu;
+mod simulate;
+mod verify;
+
+use clap::{Args, Parser, Subcommand};
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use shared_model::settings::Choice;
+use sim_host::config::{ConfigError, load, validate};
+use sim_host::pil::qemu::INTERRUPTED;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+/// Exit code of a failed verdict.
+const FAILED: u8 = 1;
+/// Exit code where the job could not be done.
+const COULD_NOT_RUN: u8 = 2;
+
+/// Host simulator of the steering ECU: compares it with the firmware in QEMU, and shows chaos and its suppression by dither.
+///
+/// Exit codes: 0 verdict pass, 1 verdict fail, 2 could not run (missing tool, bad input, time-out). The last line says why.
+#[derive(Parser)]
+#[command(name = "sim-host", version, max_term_width = 110)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Verify(verify::Arguments),
+    Simulate(simulate::Arguments),
+    Config(config::Arguments),
+    Decode(decode::Arguments),
+    Qemu(qemu::Arguments),
+}
+
+/// How a job ended that could be done.
+enum Done {
+    /// Well, or with a verdict of pass.
+    Well,
+    /// With a verdict of fail.
+    Failed,
+    /// With an exit code to pass on.
+    Code(u8),
+}
+
+/// Runs the command line.
+pub fn main() -> ExitCode {
+    let command = Cli::parse().command;
+    // Long jobs look at the flag and end in good order; a second Ctrl-C ends at once.
+    let handler = || {
+        if INTERRUPTED.swap(true, Ordering::Relaxed) {
+            std::process::exit(COULD_NOT_RUN.into());
+        }
+    };
+    if let Err(error) = ctrlc::set_handler(handler) {
+        eprintln!("warning: Ctrl-C ends this program at once: {error}");
+    }
+    let done = match command {
+        Command::Verify(arguments) => verify::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Config(arguments) => config::run(&arguments),
+        Command::Decode(arguments) => decode::run(&arguments),
+        Command::Qemu(arguments) => qemu::run(&arguments),
+    };
+    match done {
+        Ok(Done::Well) => ExitCode::SUCCESS,
+        Ok(Done::Failed) => ExitCode::from(FAILED),
+        Ok(Done::Code(code)) => ExitCode::from(code),
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(COULD_NOT_RUN)
+        }
+    }
+}
+
+/// Where a scenario's parameters come from.
+#[derive(Args)]
+struct ConfigOptions {
+    /// Preset: `reconstruction` (the reading that reproduces the paper) or `printed` (the equations as printed)
+    #[arg(long, value_name = "NAME")]
+    preset: Option<String>,
+    /// TOML file over the preset; `sim-host config` prints a complete one
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+impl ConfigOptions {
+    fn load(&self) -> Result<Scenario<f64>, ConfigError> {
+        load(self.config.as_deref(), self.preset.as_deref())
+    }
+}
+
+/// Parameters of a run that are set most often.
+#[derive(Args)]
+struct RunOptions {
+    #[command(flatten)]
+    config: ConfigOptions,
+    /// Wheel speed, rpm
+    #[arg(long, value_name = "RPM", allow_negative_numbers = true)]
+    rpm: Option<f64>,
+    /// Waveform of the dither: none, square or sine
+    #[arg(long, value_name = "WAVEFORM", value_parser = waveform)]
+    dither: Option<Waveform>,
+    /// Amplitude of the dither, V
+    #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
+    amplitude_v: Option<f64>,
+    /// Length of the run, s
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    time: Option<f64>,
+}
+
+impl RunOptions {
+    /// The scenario, checked.
+    fn scenario(&self) -> Result<Scenario<f64>, ConfigError> {
+        let mut scenario = self.config.load()?;
+        let run = &mut scenario.run;
+        run.wheel_speed_rpm = self.rpm.unwrap_or(run.wheel_speed_rpm);
+        run.duration_s = self.time.unwrap_or(run.duration_s);
+        let dither = &mut scenario.dither;
+        dither.waveform = self.dither.unwrap_or(dither.waveform);
+        dither.amplitude_v = self.amplitude_v.unwrap_or(dither.amplitude_v);
+        validate(&scenario)?;
+        Ok(scenario)
+    }
+}
+
+fn waveform(name: &str) -> Result<Waveform, String> {
+    let names = || Waveform::ALL.iter().map(|&(name, _)| name).collect::<Vec<_>>();
+    Waveform::from_name(name).ok_or_else(|| format!("must be one of {}", names().join(", ")))
+}
+
+/// Least and greatest time-out, s.
+const TIME_OUTS_S: std::ops::RangeInclusive<f64> = 0.1..=86_400.0;
+
+fn time_out(seconds: f64) -> anyhow::Result<Duration> {
+    anyhow::ensure!(
+        TIME_OUTS_S.contains(&seconds),
+        "--time-out {seconds}: must be from {} to {} s",
+        TIME_OUTS_S.start(),
+        TIME_OUTS_S.end()
+    );
+    Ok(Duration::from_secs_f64(seconds))
+}

@@ -1,0 +1,75 @@
+//! `sim-host simulate`: one run on the host, as CSV.
+
+use super::output::{Output, check_free};
+use super::{Done, RunOptions};
+use anyhow::bail;
+use sim_host::simulate::simulate;
+use sim_host::trace::Trace;
+use std::path::PathBuf;
+
+/// Run a scenario on the host and write its motion as CSV.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host simulate --rpm 1750 --time 20 --out chaos.csv
+  sim-host simulate --rpm 1750 --dither square --amplitude-v 0.1 --time 20 --out trace.csv
+  sim-host simulate --config vehicle.toml --f32 --out trace.csv")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// File to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+    /// In f32, as the ECU does, instead of f64
+    #[arg(long)]
+    f32: bool,
+    /// Overwrite the file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenario = arguments.run.scenario()?;
+    check_free(&arguments.out, arguments.force)?;
+    let trace = if arguments.f32 {
+        simulate(&scenario.map(&|value| value as f32))?
+    } else {
+        simulate(&scenario)?
+    };
+    if let Some(time_s) = trace.diverges_at_s() {
+        bail!("the motion diverges at {time_s} s; nothing was written. Set B of Table 1 with the cubic tyre and a negative peak_n do so");
+    }
+    write(&trace, &arguments.out, arguments.force)?;
+    println!(
+        "{} states over {} s in {}",
+        trace.states.len(),
+        trace.time_s(trace.states.len() - 1),
+        arguments.out.display()
+    );
+    Ok(Done::Well)
+}
+
+/// Writes a trace as CSV, one row a model step; the duty code is that of the step's last PWM period.
+pub fn write(trace: &Trace, path: &std::path::Path, force: bool) -> anyhow::Result<()> {
+    let mut output = Output::create(path, force)?;
+    let mut csv = csv::Writer::from_writer(output.writer());
+    csv.write_record([
+        "time_s",
+        "sideslip_rad",
+        "yaw_rate_rad_per_s",
+        "steering_angle_rad",
+        "steering_rate_rad_per_s",
+        "friction_mode",
+        "duty_code",
+    ])?;
+    let duties = trace.duties.chunks(trace.samples_per_step);
+    for (k, (state, duties)) in trace.states.iter().zip(duties).enumerate() {
+        let mut row = vec![trace.time_s(k).to_string()];
+        row.extend(state.x.iter().map(f64::to_string));
+        row.push(format!("{:?}", state.friction).to_lowercase());
+        row.push(duties.last().map_or(String::new(), u16::to_string));
+        csv.write_record(row)?;
+    }
+    csv.flush()?;
+    drop(csv);
+    output.finish()
+}

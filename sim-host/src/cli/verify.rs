@@ -1,0 +1,134 @@
+//! `sim-host verify`: the main job.
+
+use super::output::check_free;
+use super::{ConfigOptions, Done, time_out};
+use anyhow::{Context, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+use sim_host::config::validate;
+use sim_host::pil::elf::Image;
+use sim_host::report::{self, ReportInput, terminal};
+use sim_host::verdict::Status;
+use sim_host::verify::{Options, Progress, Verification, verify};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// Run the ECU in QEMU beside the same model on the host, and report whether they agree and whether the dither suppresses the
+/// chaos.
+///
+/// Runs 1750 rpm without dither, with a square wave of 0.1 V and with a sine of 1.0 V; 1600, 1845 and 1880 rpm without
+/// dither; the two dithers as true signals; and one run on a second core. Writes index.html, verdict.json, junit.xml and
+/// figures.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host verify                                   the paper's vehicle; report in target/report
+  sim-host verify --force --duration-s 120          longer runs, over the last report
+  sim-host verify --config vehicle.toml --out report/vehicle")]
+pub struct Arguments {
+    #[command(flatten)]
+    config: ConfigOptions,
+    /// Firmware image (ELF)
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
+    )]
+    firmware: PathBuf,
+    /// Folder for the report
+    #[arg(long, value_name = "FOLDER", default_value = "target/report")]
+    out: PathBuf,
+    /// Overwrite a report that is there
+    #[arg(long)]
+    force: bool,
+    /// Length of each main run on the target, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    duration_s: f64,
+    /// Longest time that one run in QEMU may take, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 300.0)]
+    time_out: f64,
+}
+
+/// Shorter runs hold too few cycles for a period and an exponent.
+const DURATIONS_S: std::ops::RangeInclusive<f64> = 20.0..=3600.0;
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let duration_s = arguments.duration_s;
+    ensure!(
+        DURATIONS_S.contains(&duration_s),
+        "--duration-s {duration_s}: must be from {} to {} s",
+        DURATIONS_S.start(),
+        DURATIONS_S.end()
+    );
+    let base = arguments.config.load()?;
+    validate(&base)?;
+    let options = Options {
+        time_out: time_out(arguments.time_out)?,
+        image: Image::open(&arguments.firmware)?,
+        base,
+        duration_s,
+    };
+    check_free(&arguments.out.join("index.html"), arguments.force)?;
+    std::fs::create_dir_all(&arguments.out)
+        .with_context(|| format!("cannot make the folder {}", arguments.out.display()))?;
+
+    let start = Instant::now();
+    let verification = with_progress(&options)?;
+    write_report(&arguments.out, &verification)?;
+    show(&verification, &arguments.out, start.elapsed());
+    Ok(if verification.verdict.passed() {
+        Done::Well
+    } else {
+        Done::Failed
+    })
+}
+
+fn with_progress(options: &Options) -> anyhow::Result<Verification> {
+    let bar = ProgressBar::new(0).with_style(
+        ProgressStyle::with_template(
+            "{elapsed_precise} [{bar:40}] {pos}/{len} s simulated on the ECU, {eta} left",
+        )
+        .expect("the template is valid")
+        .progress_chars("=> "),
+    );
+    let simulated_s = Mutex::new(0.0);
+    let on_terminal = std::io::stderr().is_terminal();
+    let start = Instant::now();
+    let verification = verify(options, |progress| match progress {
+        Progress::Planned(seconds) => bar.inc_length(seconds as u64),
+        Progress::Simulated(seconds) => {
+            let mut total_s = simulated_s.lock().expect("nobody panics with it");
+            *total_s += seconds;
+            bar.set_position(*total_s as u64);
+        }
+        Progress::Done(line) if on_terminal => bar.suspend(|| eprintln!("{line}")),
+        Progress::Done(line) => eprintln!("[{:5.1} s] {line}", start.elapsed().as_secs_f64()),
+    });
+    bar.finish_and_clear();
+    Ok(verification?)
+}
+
+fn write_report(folder: &Path, verification: &Verification) -> anyhow::Result<()> {
+    let input = ReportInput {
+        title: "Steering ECU: firmware against host, and chaos suppressed by dither",
+        verdict: &verification.verdict,
+        runs: &verification.runs,
+        pairs: &verification.pairs,
+        notes: &verification.notes,
+    };
+    report::write(folder, &input)
+}
+
+fn show(verification: &Verification, folder: &Path, elapsed: Duration) {
+    let verdict = &verification.verdict;
+    print!("{}", terminal::table(verdict, std::io::stdout().is_terminal()));
+    println!("report: {}", folder.join("index.html").display());
+    println!(
+        "verdict: {} ({} passed, {} failed, {} untested) in {:.0} s",
+        verdict.verdict,
+        verdict.count(Status::Passed),
+        verdict.count(Status::Failed),
+        verdict.count(Status::Untested),
+        elapsed.as_secs_f64()
+    );
+}

@@ -1,0 +1,4 @@
+//! Arithmetics for analysis: the model evaluated in something else than plain numbers.
+
+pub mod dual;
+pub mod rounding;

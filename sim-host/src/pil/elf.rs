@@ -1,0 +1,102 @@
+//! The firmware's image: is it one for this machine, and how large is it?
+
+use object::{Architecture, Object, ObjectSection, SectionFlags, elf};
+use std::path::{Path, PathBuf};
+
+/// Data addresses start here on every Cortex-M.
+const RAM_START: u64 = 0x2000_0000;
+
+/// A firmware image that has been checked.
+#[derive(Debug, Clone)]
+pub struct Image {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// Flash that it takes, bytes: code, constants and the start values of variables.
+    pub flash_bytes: u64,
+    /// RAM that its static variables take, bytes; the stack comes on top.
+    pub ram_bytes: u64,
+}
+
+/// Why a file is no image.
+#[derive(Debug, thiserror::Error)]
+pub enum ImageError {
+    /// The file cannot be read.
+    #[error("cannot read the firmware image {path}: {source}; build it with `cargo xtask firmware`")]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no ELF file.
+    #[error("{path} is not an ELF file: {reason}; give the firmware's ELF, which `cargo xtask firmware` builds")]
+    NotElf {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// It is for another machine.
+    #[error("{path} is an image for {found}, not for a 32-bit Arm Cortex-M; build it with `cargo xtask firmware`")]
+    OtherMachine {
+        /// The file.
+        path: PathBuf,
+        /// Its machine.
+        found: String,
+    },
+}
+
+impl Image {
+    /// Reads and checks an image.
+    ///
+    /// # Errors
+    /// If the file cannot be read or is no ELF for 32-bit Arm.
+    pub fn open(path: &Path) -> Result<Self, ImageError> {
+        let path = path.to_path_buf();
+        let bytes = std::fs::read(&path).map_err(|source| ImageError::Unreadable {
+            path: path.clone(),
+            source,
+        })?;
+        let file = object::File::parse(&*bytes).map_err(|error| ImageError::NotElf {
+            path: path.clone(),
+            reason: error.to_string(),
+        })?;
+        if file.architecture() != Architecture::Arm {
+            return Err(ImageError::OtherMachine {
+                path,
+                found: format!("{:?}", file.architecture()),
+            });
+        }
+        let (flash_bytes, ram_bytes) = sizes(&file);
+        Ok(Self {
+            path,
+            flash_bytes,
+            ram_bytes,
+            bytes,
+        })
+    }
+}
+
+fn sizes(file: &object::File<'_>) -> (u64, u64) {
+    let mut flash = 0;
+    let mut ram = 0;
+    for section in file.sections() {
+        let SectionFlags::Elf { sh_flags } = section.flags() else {
+            continue;
+        };
+        if sh_flags & u64::from(elf::SHF_ALLOC) == 0 {
+            continue;
+        }
+        let in_ram = section.address() >= RAM_START;
+        let stored = section.file_range().is_some();
+        if in_ram {
+            ram += section.size();
+        }
+        if stored {
+            flash += section.size();
+        }
+    }
+    (flash, ram)
+}

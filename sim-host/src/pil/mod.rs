@@ -1,0 +1,7 @@
+//! Processor in the loop: the firmware's image, the emulator that runs it, and what it tells.
+
+pub mod elf;
+pub mod log;
+pub mod qemu;
+pub mod settings;
+pub mod telemetry;

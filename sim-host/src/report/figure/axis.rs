@@ -1,0 +1,243 @@
+//! Axes with round ticks, linear or logarithmic.
+
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+use std::ops::Range;
+
+/// An axis of a panel. Values beyond its ends are drawn on them.
+#[derive(Debug, Clone)]
+pub struct Axis {
+    /// What it shows, with its unit; empty for an axis without name.
+    pub name: String,
+    /// Value at its lower end.
+    pub low: f64,
+    /// Value at its upper end.
+    pub high: f64,
+    /// Values of its ticks.
+    pub ticks: Vec<f64>,
+    scale: Scale,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Scale {
+    Linear { decimals: usize },
+    Logarithmic,
+}
+
+/// The greatest number of decades on a logarithmic axis.
+const MOST_DECADES: f64 = 14.0;
+/// Logarithmic axes end at this power of ten, and at its inverse.
+const MOST_DECADE: f64 = 300.0;
+/// Values further out than this are not drawn to scale: they would overflow the arithmetic.
+const GREATEST: f64 = 1e30;
+
+impl Axis {
+    /// A linear axis from `low` to `high` with at most about `ticks` ticks.
+    pub fn linear(name: &str, low: f64, high: f64, ticks: usize) -> Self {
+        let low = low.clamp(-GREATEST, GREATEST);
+        let mut high = high.clamp(-GREATEST, GREATEST);
+        if high - low <= 1e-9 * low.abs().max(high.abs()).max(1e-3) {
+            high = low + 1.0_f64.max(low.abs() * 0.01);
+        }
+        let (step, decimals) = round_step((high - low) / ticks.max(1) as f64);
+        let first = (low / step - 1e-9).ceil();
+        let last = (high / step + 1e-9).floor();
+        let count = (last - first) as i32;
+        Self {
+            name: name.into(),
+            low,
+            high,
+            ticks: (0..=count)
+                .map(|n| (first + f64::from(n)) * step + 0.0)
+                .collect(),
+            scale: Scale::Linear { decimals },
+        }
+    }
+
+    /// A linear axis around the values with a margin; from 0 to 1 if there are none.
+    pub fn around(name: &str, values: impl IntoIterator<Item = f64>, ticks: usize) -> Self {
+        let Some((low, high)) = bounds(values) else {
+            return Self::linear(name, 0.0, 1.0, ticks);
+        };
+        let (low, high) = (low.max(-GREATEST), high.min(GREATEST));
+        let span = high - low;
+        let margin = if span > 1e-9 * low.abs().max(high.abs()) {
+            0.06 * span
+        } else {
+            (0.05 * low.abs()).max(1e-3)
+        };
+        Self::linear(name, low - margin, high + margin, ticks)
+    }
+
+    /// A logarithmic axis of whole decades around the values that are greater than 0, with at most
+    /// about `ticks` ticks.
+    pub fn decades(name: &str, values: impl IntoIterator<Item = f64>, ticks: usize) -> Self {
+        let logs = values
+            .into_iter()
+            .filter(|value| *value > 0.0)
+            .map(|value| value.log10().clamp(-MOST_DECADE, MOST_DECADE));
+        let (low, high) = bounds(logs).unwrap_or((0.0, 1.0));
+        let high = high.ceil().max(low.floor() + 1.0);
+        let low = low.floor().max(high - MOST_DECADES);
+        let step = ((high - low) / ticks.max(1) as f64).ceil().max(1.0);
+        let first = (low / step).ceil() as i32;
+        let last = (high / step).floor() as i32;
+        let power = |exponent: f64| 10_f64.powf(exponent);
+        Self {
+            name: name.into(),
+            low: power(low),
+            high: power(high),
+            ticks: (first..=last).map(|n| power(f64::from(n) * step)).collect(),
+            scale: Scale::Logarithmic,
+        }
+    }
+
+    /// The same axis with another name.
+    pub fn named(&self, name: &str) -> Self {
+        Self {
+            name: name.into(),
+            ..self.clone()
+        }
+    }
+
+    /// Where a value lies: 0 at the lower end, 1 at the upper.
+    fn fraction(&self, value: f64) -> f64 {
+        let place = |value: f64| match self.scale {
+            Scale::Linear { .. } => value,
+            Scale::Logarithmic => value.max(f64::MIN_POSITIVE).log10(),
+        };
+        let (low, high) = (place(self.low), place(self.high));
+        ((place(value) - low) / (high - low)).clamp(0.0, 1.0)
+    }
+}
+
+impl Ranged for Axis {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, (start, end): (i32, i32)) -> i32 {
+        start + (self.fraction(*value) * f64::from(end - start)).round() as i32
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        if hint.weight().allow_light_points() {
+            return Vec::new();
+        }
+        self.ticks.clone()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.low..self.high
+    }
+}
+
+impl ValueFormatter<f64> for Axis {
+    fn format_ext(&self, tick: &f64) -> String {
+        match self.scale {
+            Scale::Linear { decimals } => format!("{tick:.decimals$}").replace('-', "\u{2212}"),
+            Scale::Logarithmic => power_of_ten(tick.log10().round() as i32),
+        }
+    }
+}
+
+fn bounds(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+    values
+        .into_iter()
+        .filter(|value| value.is_finite())
+        .fold(None, |bounds, value| {
+            let (low, high) = bounds.unwrap_or((value, value));
+            Some((value.min(low), value.max(high)))
+        })
+}
+
+/// The least of 1, 2, 5 times a power of ten that is not less than `least`, and the decimals it needs.
+fn round_step(least: f64) -> (f64, usize) {
+    let exponent = least.log10().floor() as i32;
+    let power = 10_f64.powi(exponent);
+    let (factor, carry) = match least / power {
+        ratio if ratio <= 1.0 + 1e-9 => (1.0, 0),
+        ratio if ratio <= 2.0 + 1e-9 => (2.0, 0),
+        ratio if ratio <= 5.0 + 1e-9 => (5.0, 0),
+        _ => (10.0, 1),
+    };
+    (factor * power, (-(exponent + carry)).max(0) as usize)
+}
+
+fn power_of_ten(exponent: i32) -> String {
+    match exponent {
+        0 => "1".into(),
+        1 => "10".into(),
+        _ => {
+            let superscript = |character| match character {
+                '-' => '\u{207b}',
+                '1' => '\u{b9}',
+                '2' => '\u{b2}',
+                '3' => '\u{b3}',
+                digit => {
+                    char::from_u32(0x2070 + (u32::from(digit) - u32::from('0'))).unwrap_or(digit)
+                }
+            };
+            let exponent: String = exponent.to_string().chars().map(superscript).collect();
+            format!("10{exponent}")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(axis: &Axis) -> Vec<String> {
+        axis.ticks
+            .iter()
+            .map(|tick| axis.format_ext(tick))
+            .collect()
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        let axis = Axis::linear("", -0.23, 0.31, 6);
+        assert_eq!(
+            labels(&axis),
+            ["\u{2212}0.2", "\u{2212}0.1", "0.0", "0.1", "0.2", "0.3"]
+        );
+        let axis = Axis::linear("", 0.0, 15.0, 8);
+        assert_eq!(labels(&axis), ["0", "2", "4", "6", "8", "10", "12", "14"]);
+        assert_eq!(
+            labels(&Axis::linear("", 2.9, 3.1, 4)),
+            ["2.90", "2.95", "3.00", "3.05", "3.10"]
+        );
+    }
+
+    #[test]
+    fn decades_are_powers_of_ten() {
+        let axis = Axis::decades("", [0.0, 3e-4, 20.0, f64::NAN], 10);
+        assert_eq!(
+            labels(&axis),
+            [
+                "10\u{207b}\u{2074}",
+                "10\u{207b}\u{b3}",
+                "10\u{207b}\u{b2}",
+                "10\u{207b}\u{b9}",
+                "1",
+                "10",
+                "10\u{b2}"
+            ]
+        );
+        assert_eq!(axis.map(&0.0, (0, 60)), 0);
+        assert_eq!(axis.map(&1.0, (0, 60)), 40);
+    }
+
+    #[test]
+    fn values_without_extent_get_an_axis() {
+        for axis in [
+            Axis::around("", [0.0], 5),
+            Axis::around("", [1e30, 1e300], 5),
+            Axis::around("", [], 5),
+            Axis::linear("", 3.0, 3.0, 5),
+            Axis::decades("", [1.0], 5),
+            Axis::decades("", [], 5),
+        ] {
+            assert!(axis.low < axis.high && !axis.ticks.is_empty(), "{axis:?}");
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Distance of the f32 and f64 runs against time.
+
+use super::axis::Axis;
+use super::panel::{Panel, stack, stack_height};
+use super::reduce::{Point, maxima};
+use super::style::{Area, INSTANT, LIMIT, Line, RUNS, Sample, figure};
+use crate::report::RunReport;
+
+const BUCKETS: usize = 400;
+const PANEL: u32 = 340;
+const ROOM: f64 = 1.2;
+
+/// The figure: a panel for each run that chaos parts, and one for those that must never part.
+pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
+    let styled: Vec<(&RunReport, Line)> = runs.iter().zip(RUNS.into_iter().cycle()).collect();
+    let mut legend: Vec<_> = styled
+        .iter()
+        .map(|(run, line)| (run.title.clone(), Sample::Line(*line)))
+        .collect();
+    legend.push(("limit".into(), Sample::Line(LIMIT)));
+    let (parting, bounded): (Vec<_>, Vec<_>) = styled
+        .into_iter()
+        .partition(|(run, _)| run.horizon_s.is_some());
+    if !parting.is_empty() {
+        legend.push(("predicted horizon".into(), Sample::Band));
+        legend.push(("expected".into(), Sample::Line(INSTANT)));
+    }
+    // A panel for each horizon, so that it is clear whose it is.
+    let mut groups: Vec<(String, Vec<(&RunReport, Line)>)> = parting
+        .into_iter()
+        .map(|run| (format!("must part: {}", run.0.title), vec![run]))
+        .collect();
+    if !bounded.is_empty() {
+        groups.push(("must never part: the other runs".into(), bounded));
+    }
+    let heading = "Divergence of f32 and f64 against the predicted horizon";
+    let height = stack_height(groups.len().max(1), PANEL);
+    figure(heading, &legend, height, |area| {
+        let curves = runs.iter().flat_map(|run| &run.divergence);
+        let values = || {
+            curves
+                .clone()
+                .copied()
+                .filter(|p| p.0.is_finite() && p.1.is_finite())
+        };
+        let limits = runs.iter().map(|run| run.divergence_limit);
+        // So much room that no curve lies on the frame.
+        let distances = values().map(|p| p.1).chain(limits);
+        let y = Axis::decades(
+            "relative distance",
+            distances.flat_map(|distance| [distance / ROOM, distance * ROOM]),
+            10,
+        );
+        let end_s = end_s(runs, values().map(|p| p.0).fold(0.0, f64::max));
+        let rows = stack(area, groups.len(), PANEL, "time (s)");
+        for ((area, time), (caption, runs)) in rows.iter().zip(&groups) {
+            panel(
+                area,
+                caption,
+                Axis::linear(time, 0.0, end_s, 12),
+                y.clone(),
+                runs,
+            )?;
+        }
+        if groups.is_empty() {
+            Panel::new(area, "", Axis::linear("time (s)", 0.0, 1.0, 5), y)?.no_data()?;
+        }
+        Ok(())
+    })
+}
+
+/// End of the time axis: that of the runs, or somewhat later to show a horizon behind it.
+fn end_s(runs: &[RunReport], data_end_s: f64) -> f64 {
+    runs.iter()
+        .filter_map(|run| run.horizon_s)
+        .map(|horizon| horizon[2].min(1.5 * data_end_s))
+        .fold(data_end_s, f64::max)
+}
+
+fn panel(
+    area: &Area,
+    caption: &str,
+    x: Axis,
+    y: Axis,
+    runs: &[(&RunReport, Line)],
+) -> anyhow::Result<()> {
+    let panel = Panel::new(area, caption, x, y)?;
+    for horizon in runs.iter().filter_map(|(run, _)| run.horizon_s) {
+        panel.band(horizon[0], horizon[2])?;
+    }
+    for horizon in runs.iter().filter_map(|(run, _)| run.horizon_s) {
+        panel.instant(horizon[1], INSTANT)?;
+    }
+    let mut limits: Vec<f64> = runs.iter().map(|(run, _)| run.divergence_limit).collect();
+    limits.sort_by(f64::total_cmp);
+    limits.dedup();
+    for limit in limits.into_iter().filter(|limit| limit.is_finite()) {
+        panel.level(limit, LIMIT)?;
+    }
+    let curves: Vec<(Vec<Point>, Line)> = runs
+        .iter()
+        .map(|(run, line)| (maxima(run.divergence.iter().copied(), BUCKETS), *line))
+        .collect();
+    let curves: Vec<(&[Point], Line)> = curves
+        .iter()
+        .map(|(points, line)| (points.as_slice(), *line))
+        .collect();
+    panel.lines(&curves)
+}

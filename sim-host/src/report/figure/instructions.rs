@@ -1,0 +1,84 @@
+//! Histograms of the instructions that the tasks took.
+
+use super::axis::Axis;
+use super::panel::{Panel, stack, stack_height};
+use super::style::{Area, MAIN, WIDTH, figure};
+use crate::report::RunReport;
+
+/// About the number of bars across a panel.
+const BARS: f64 = 100.0;
+const PANEL: u32 = 190;
+/// Where the count axis begins, so that a count of 1 has a bar.
+const LEAST: f64 = 0.5;
+
+/// Instructions, and how often.
+type Histogram = [(u32, u64)];
+/// Left end, right end and height of a bar.
+type Bar = (f64, f64, f64);
+
+/// The figure: a row for each run, the control task on the left, the PWM task on the right.
+pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
+    let heading = "Instructions of the control task (left) and of the PWM task (right)";
+    figure(heading, &[], stack_height(runs.len(), PANEL), |area| {
+        let (left, right) = area.split_horizontally(WIDTH / 2);
+        let rows = |histogram: fn(&RunReport) -> &Histogram| -> Vec<(&str, &Histogram)> {
+            runs.iter()
+                .map(|run| (run.title.as_str(), histogram(run)))
+                .collect()
+        };
+        let control = rows(|run| &run.control_instructions);
+        column(&left, "instructions of a control task", &control)?;
+        let pwm = rows(|run| &run.pwm_instructions);
+        column(&right, "instructions of a PWM task", &pwm)
+    })
+}
+
+/// The histograms of one task on common axes.
+fn column(area: &Area, name: &str, rows: &[(&str, &Histogram)]) -> anyhow::Result<()> {
+    let all = || rows.iter().flat_map(|(_, histogram)| histogram.iter());
+    let x = Axis::around(name, all().map(|entry| f64::from(entry.0)), 9);
+    let width = ((x.high - x.low) / BARS).floor().max(1.0);
+    let bars: Vec<Vec<Bar>> = rows
+        .iter()
+        .map(|(_, histogram)| bars(histogram, width))
+        .collect();
+    let counts = bars.iter().flatten().map(|bar| bar.2);
+    let y = Axis::decades("count", counts.chain([LEAST, 1.0]), 4);
+    let panels = stack(area, rows.len(), PANEL, name);
+    for (((area, name), (title, histogram)), bars) in panels.iter().zip(rows).zip(&bars) {
+        let panel = Panel::new(area, title, x.named(name), y.clone())?;
+        panel.bars(bars, MAIN.colour)?;
+        if let Some((most, _)) = histogram.last() {
+            panel.remark(&format!("greatest {most}"))?;
+        }
+    }
+    Ok(())
+}
+
+/// The histogram in bins of the given width: bars around the values, and their counts.
+fn bars(histogram: &Histogram, width: f64) -> Vec<Bar> {
+    let mut bars: Vec<Bar> = Vec::new();
+    for &(value, count) in histogram {
+        let left = (f64::from(value) / width).floor() * width - 0.5;
+        match bars.last_mut() {
+            Some(bar) if bar.0 == left => bar.2 += count as f64,
+            _ => bars.push((left, left + width, count as f64)),
+        }
+    }
+    bars
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bins_keep_the_counts() {
+        let histogram = [(10, 3), (11, 1), (14, 5), (20, 2)];
+        assert_eq!(bars(&histogram, 1.0).len(), 4);
+        assert_eq!(
+            bars(&histogram, 4.0),
+            [(7.5, 11.5, 4.0), (11.5, 15.5, 5.0), (19.5, 23.5, 2.0)]
+        );
+    }
+}

@@ -1,0 +1,168 @@
+//! The report: figures, one HTML page, and the verdict for programs.
+
+mod figure;
+mod file;
+mod html;
+mod junit;
+#[cfg(test)]
+mod sample;
+pub mod terminal;
+mod text;
+
+use crate::trace::Trace;
+use crate::verdict::Verdict;
+use anyhow::{Context, ensure};
+use std::fs;
+use std::path::Path;
+
+/// What the report shows of one run on the ECU.
+#[derive(Debug, Clone)]
+pub struct RunReport {
+    /// Name for file names: lower case, digits and hyphens.
+    pub id: String,
+    /// Name for people, for instance `1750 rpm, square dither 0.1 V`.
+    pub title: String,
+    /// The firmware's telemetry.
+    pub trace: Trace,
+    /// When the dither sets in, s; none without dither.
+    pub dither_start_s: Option<f64>,
+    /// Volts of a duty code: (code - period/2) times this.
+    pub volts_per_count: f64,
+    /// Time (s) and defect of each step over its bound (at most 1 passes): host f64 step from the firmware's state.
+    pub one_step_defect: Vec<(f64, f64)>,
+    /// Time (s) and distance of free f32 and f64 runs, relative to the attractor's size.
+    pub divergence: Vec<(f64, f64)>,
+    /// When they are predicted to part, s: least, expected, greatest; none where they must never part.
+    pub horizon_s: Option<[f64; 3]>,
+    /// Distance at which they count as parted, or which they must never reach.
+    pub divergence_limit: f64,
+    /// Instructions of each control task, and how often: ascending.
+    pub control_instructions: Vec<(u32, u64)>,
+    /// Instructions of the slowest PWM task in each step, and how often: ascending.
+    pub pwm_instructions: Vec<(u32, u64)>,
+}
+
+/// Two runs that differ in nothing but the dither.
+#[derive(Debug, Clone)]
+pub struct Pair {
+    /// Name for people, for instance `1750 rpm: no dither against square dither 0.1 V`.
+    pub title: String,
+    /// Index of the run without dither.
+    pub before: usize,
+    /// Index of the run with dither.
+    pub after: usize,
+}
+
+/// Everything that a report shows.
+#[derive(Debug, Clone, Copy)]
+pub struct ReportInput<'a> {
+    /// Heading of the page and name of the test suite.
+    pub title: &'a str,
+    /// The checks.
+    pub verdict: &'a Verdict,
+    /// The runs on the ECU; those named in check ids behind the `/` give the groups their titles.
+    pub runs: &'a [RunReport],
+    /// The runs to be shown before and after.
+    pub pairs: &'a [Pair],
+    /// Name and value of further facts: memory use, toolchain, revision.
+    pub notes: &'a [(String, String)],
+}
+
+/// Writes `index.html`, `verdict.json`, `junit.xml` and `figures/*.svg` into the directory, which is
+/// made if it is missing. Files of these names are replaced, each at once; `index.html` comes last.
+pub fn write(directory: &Path, input: &ReportInput) -> anyhow::Result<()> {
+    for pair in input.pairs {
+        ensure!(
+            pair.before.max(pair.after) < input.runs.len(),
+            "the pair {:?} names run {} of {}",
+            pair.title,
+            pair.before.max(pair.after),
+            input.runs.len()
+        );
+    }
+    let figures = figure::all(input)?;
+    let figure_directory = directory.join("figures");
+    fs::create_dir_all(&figure_directory)
+        .with_context(|| format!("cannot make {}", figure_directory.display()))?;
+    for figure in &figures {
+        file::replace(
+            &figure_directory.join(format!("{}.svg", figure.name)),
+            &figure.svg,
+        )?;
+    }
+    let verdict = serde_json::to_string_pretty(input.verdict)? + "\n";
+    file::replace(&directory.join("verdict.json"), &verdict)?;
+    let junit = junit::document(input.title, input.verdict)?;
+    file::replace(&directory.join("junit.xml"), &junit)?;
+    file::replace(
+        &directory.join("index.html"),
+        &html::page(input, &figures).into_string(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writes_every_file_and_the_verdict_with_the_agreed_keys() {
+        let directory = tempfile::tempdir().unwrap();
+        let target = directory.path().join("report");
+        let (verdict, runs, pairs) = (sample::verdict(), sample::runs(), sample::pairs());
+        let input = sample::input(&verdict, &runs, &pairs);
+        write(&target, &input).unwrap();
+        write(&target, &input).unwrap();
+
+        let mut names: Vec<_> = fs::read_dir(&target)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        assert_eq!(
+            names,
+            ["figures", "index.html", "junit.xml", "verdict.json"]
+        );
+        for entry in fs::read_dir(target.join("figures")).unwrap() {
+            let path = entry.unwrap().path();
+            assert_eq!(path.extension().unwrap(), "svg");
+            let size = path.metadata().unwrap().len();
+            assert!(size < 400_000, "{} has {size} bytes", path.display());
+        }
+
+        let text = fs::read_to_string(target.join("verdict.json")).unwrap();
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let keys = |value: &serde_json::Value| -> Vec<String> {
+            value.as_object().unwrap().keys().cloned().collect()
+        };
+        let sorted = |mut keys: Vec<String>| {
+            keys.sort();
+            keys
+        };
+        assert_eq!(sorted(keys(&json)), ["checks", "verdict"]);
+        assert_eq!(json["verdict"], "fail");
+        let checks = json["checks"].as_array().unwrap();
+        assert_eq!(checks.len(), verdict.checks.len());
+        for check in checks {
+            assert_eq!(
+                sorted(keys(check)),
+                [
+                    "detail", "id", "limit", "measured", "status", "title", "unit"
+                ]
+            );
+        }
+        assert_eq!(checks[0]["status"], "passed");
+        assert!(checks[6]["measured"].is_null());
+    }
+
+    #[test]
+    fn a_pair_of_a_run_that_is_not_there_is_an_error() {
+        let (verdict, runs) = (sample::verdict(), sample::runs());
+        let pairs = [Pair {
+            title: "none".into(),
+            before: 0,
+            after: 99,
+        }];
+        let error = write(Path::new("unused"), &sample::input(&verdict, &runs, &pairs));
+        assert!(error.unwrap_err().to_string().contains("99"));
+    }
+}
