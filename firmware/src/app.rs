@@ -13,8 +13,9 @@ use shared_model::controller::Ecu;
 use shared_model::telemetry::Header;
 use shared_model::{InvalidScenario, Scenario};
 
-/// The watchdog bites when no model step arrives for this long, ms.
-const WATCHDOG_MS: u32 = 20;
+/// The watchdog bites when no model step arrives for this many of its periods, or for this long, ms, if that is longer.
+const WATCHDOG_PERIODS: f32 = 4.0;
+const WATCHDOG_LEAST_MS: u32 = 20;
 /// Priorities as the registers have them; a lower number preempts a higher one.
 const PWM_PRIORITY: u8 = 0x00;
 const CONTROL_PRIORITY: u8 = 0xE0;
@@ -142,6 +143,7 @@ fn start(
     control: ControlInterrupt,
     scenario: &Scenario<f32>,
 ) {
+    let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * scenario.step_s()) as u32;
     let samples_a_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
     critical_section::with(|_| {
         let period = task.neutral().period();
@@ -150,7 +152,7 @@ fn start(
             tasks::hand_over(PwmInterrupt { task, pwm }, control, samples_a_ms);
         }
         set_priorities();
-        Current::start_watchdog(WATCHDOG_MS);
+        Current::start_watchdog(timeout_ms.max(WATCHDOG_LEAST_MS));
     });
 }
 

@@ -282,6 +282,11 @@ impl<T: Real> Model<T> {
         }
     }
 
+    /// Greatest friction torque, N m.
+    pub(crate) fn friction_limit_nm(&self) -> T {
+        self.friction_limit_nm
+    }
+
     /// The steering comes to rest and may stick: Coulomb friction whose sign function is not dithered, or not yet.
     pub(crate) fn can_stick(&self, injection: Injection<T>) -> bool {
         let (lower, upper) = (T::zero(), T::zero());

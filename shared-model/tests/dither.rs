@@ -55,13 +55,14 @@ proptest! {
 
     /// Both arithmetics run through the same phases: the square waves are equal, the sines differ by the sine's error.
     #[test]
-    fn arithmetics_share_the_phase(increment in 1..u32::MAX / 2) {
-        // f32 holds no more than 24 bits of the frequency.
-        let increment = f64::from(increment as f32);
-        let pair = |waveform| (
-            Oscillator::new(&dither::<f32>(waveform, increment), 1.0),
-            Oscillator::new(&dither::<f32>(waveform, increment).map(&f64::from), 1.0),
-        );
+    fn arithmetics_share_the_phase(frequency_rad_per_s in 1.0..31_000.0_f32) {
+        let pair = |waveform| {
+            let mut dither = Scenario::<f32>::reconstruction().dither;
+            dither.waveform = waveform;
+            dither.square_frequency_rad_per_s = frequency_rad_per_s;
+            dither.sine_frequency_rad_per_s = frequency_rad_per_s;
+            (Oscillator::new(&dither, 10e3_f32), Oscillator::new(&dither.map(&f64::from), 10e3_f64))
+        };
         let (mut square32, mut square64) = pair(Waveform::Square);
         let (mut sine32, mut sine64) = pair(Waveform::Sine);
         prop_assert_eq!(square32, square64);

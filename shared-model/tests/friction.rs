@@ -38,8 +38,9 @@ prop_compose! {
         law in prop::sample::select(vec![FrictionLaw::CoulombRate, FrictionLaw::PrintedAngle]),
         dithered: bool,
         waveform in prop::sample::select(vec![Waveform::None, Waveform::Square, Waveform::Sine]),
-        // Up to 0.002 rad/s at the sign function's argument, of the order of the rates near rest, and beyond.
-        amplitude_v in prop_oneof![0.0..1e-6_f64, 0.0..0.2_f64],
+        // At the steering rate's sign 0.02 rad/s and more: a square wave of less has its two steps so near to each other that
+        // one integration step may pass both.
+        amplitude_v in prop_oneof![Just(0.0), 1e-5..1e-3_f64, 1e-3..0.2_f64],
         wheel_speed_rpm in 800.0..2000.0_f64,
         x in (-0.2..0.2_f64, -0.5..0.5_f64, -0.5..0.5_f64, -0.5..0.5_f64),
     ) -> Scenario<f64> {
@@ -134,6 +135,8 @@ proptest! {
     fn crossing_needs_more_than_a_touch(injection in injection()) {
         let Sign::Stepped { lower, upper } = Sign::new(injection) else { return Ok(()) };
         let sign = Sign::Stepped { lower, upper };
+        // Neither side of a step is preferred.
+        prop_assert_eq!([lower, upper].map(|u| sign.mode(u)), [FrictionMode::Neutral; 2]);
         prop_assert_eq!(sign.crossing(FrictionMode::Positive, upper), None);
         prop_assert_eq!(sign.crossing(FrictionMode::Negative, lower), None);
         prop_assert_eq!(sign.crossing(FrictionMode::Neutral, lower), None);
@@ -142,6 +145,8 @@ proptest! {
 
     /// Coulomb friction only takes energy from the steering: its torque times the rate is never negative, along
     /// trajectories through slip, stick and every mean dither. The torque is the difference to the same model without it.
+    /// The mode behind a change is held for the rest of the step; what the torques change by in a step, some 0.5 N m, may
+    /// turn the rate around by 5e-5 rad/s in it: 3e-4 W, a ten-thousandth of the power in motion.
     #[test]
     fn coulomb_friction_does_no_work_on_the_steering(
         scenario in scenario(), signal: bool,
@@ -163,7 +168,7 @@ proptest! {
             let without = frictionless.derivative(&state.x, injection, FrictionMode::Neutral);
             let torque_nm = scenario.steering.inertia_kg_m2 * (without - with)[STEERING_RATE];
             let power_w = torque_nm * state.x[STEERING_RATE];
-            prop_assert!(power_w >= -1e-12, "{power_w} W out of friction in {state:?}");
+            prop_assert!(power_w >= -5e-4, "{power_w} W out of friction in {state:?}");
             let limit = 6.5856 + 1e-9;
             prop_assert!(torque_nm.abs() <= limit || state.friction == FrictionMode::Sticking);
         }
@@ -213,32 +218,43 @@ fn sticks<T: Real>(
     scenario.steering.motor_current_a = T::from_f64(current_a);
     scenario.friction.dithered = dithered;
     let model = Model::new(&scenario);
-    let x = [x.0, x.1, x.2, 0.0].map(T::from_f64);
-    let mut state: State<T> = model.state(x.into());
     let limit = scenario
         .friction
         .limit_nm(scenario.steering.pneumatic_trail_m);
-    let (mut steps, mut torque) = (0, model.driving_torque_nm(&state.x, Injection::Off));
-    while torque.abs() <= limit && steps < 500 {
+    // The same with friction that nothing here breaks loose: where the steering would be if it stuck.
+    scenario.friction.coefficient = T::from_f64(10.0);
+    scenario.friction.front_wheel_load_kg = T::from_f64(1e5);
+    let held = Model::new(&scenario);
+    let x = [x.0, x.1, x.2, 0.0].map(T::from_f64);
+    let mut state: State<T> = model.state(x.into());
+    let torque = |state: &State<T>| model.driving_torque_nm(&state.x, Injection::Off);
+    for _ in 0..500 {
+        let mut stuck = state;
+        integrate::step(&held, &mut stuck, T::from_f64(1e-3), Injection::Off);
+        prop_assert!(stuck.x[STEERING_ANGLE] == x[2], "held, yet the angle crept");
+        let (before, after) = (torque(&state), torque(&stuck));
         integrate::step(&model, &mut state, T::from_f64(1e-3), Injection::Off);
-        prop_assert!(
-            state.x[STEERING_ANGLE] == x[2],
-            "the angle crept to {:?}",
-            state.x
-        );
-        prop_assert!(state.x[STEERING_RATE] == T::zero(), "at rate {:?}", state.x);
-        prop_assert_eq!(state.friction, FrictionMode::Sticking);
-        torque = model.driving_torque_nm(&state.x, Injection::Off);
-        steps += 1;
-    }
-    // So far beyond the limit that the tyres cannot turn the pull around within the step.
-    if torque.abs() > limit + T::from_f64(1.0) {
-        integrate::step(&model, &mut state, T::from_f64(1e-3), Injection::Off);
-        prop_assert!(
-            state.x[STEERING_RATE] * torque > T::zero(),
-            "pulled by {torque:?} into {state:?}"
-        );
-        prop_assert!((state.x[STEERING_ANGLE] - x[2]) * torque > T::zero());
+        if before.abs() <= limit && after.abs() <= limit {
+            prop_assert_eq!(
+                state,
+                stuck,
+                "pulled by {:?} and {:?} of {:?} N m",
+                before,
+                after,
+                limit
+            );
+            prop_assert_eq!(state.friction, FrictionMode::Sticking);
+            continue;
+        }
+        // So far beyond the limit that the tyres cannot turn the pull around within the step.
+        if before.abs() > limit + T::from_f64(1.0) {
+            prop_assert!(
+                state.x[STEERING_RATE] * before > T::zero(),
+                "pulled by {before:?} N m into {state:?}"
+            );
+            prop_assert!((state.x[STEERING_ANGLE] - x[2]) * before > T::zero());
+        }
+        break;
     }
     Ok(())
 }

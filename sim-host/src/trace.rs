@@ -1,5 +1,6 @@
 //! A recorded motion: states at a fixed step, and the duty codes of the PWM.
 
+use nalgebra::Vector4;
 use shared_model::vehicle::State;
 
 /// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
@@ -65,11 +66,20 @@ impl Trace {
         Some(self.time_s(first))
     }
 
-    /// The trace up to `steps` steps.
-    pub fn first_steps(&self, steps: usize) -> Self {
-        let mut first = self.clone();
-        first.states.truncate(steps);
-        first.duties.truncate(steps * self.samples_per_step);
-        first
+    /// The slow motion under a fast ripple: each state replaced by the mean of those within half of `window_s` of it. The
+    /// first and last states, whose window is not whole, are left out, so the trace begins half a window later.
+    pub fn smoothed(&self, window_s: f64) -> Self {
+        let half = (0.5 * window_s / self.step_s).round() as usize;
+        let mean = |window: &[State<f64>]| {
+            let sum: Vector4<f64> = window.iter().map(|state| state.x).sum();
+            State {
+                x: sum / window.len() as f64,
+                friction: window[half].friction,
+            }
+        };
+        Self {
+            states: self.states.windows(2 * half + 1).map(mean).collect(),
+            ..self.clone()
+        }
     }
 }

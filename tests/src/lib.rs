@@ -1,1 +1,53 @@
+//! Runs of the firmware's images in QEMU, for the tests.
 
+use sim_host::pil::elf::Image;
+use sim_host::pil::qemu::{self, Finished, Machine, RunError};
+use sim_host::pil::settings;
+use sim_host::pil::telemetry::Recording;
+use shared_model::Scenario;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Far more than any run of the tests takes.
+pub const TIME_OUT: Duration = Duration::from_secs(120);
+/// File of a run's telemetry in its folder.
+pub const TELEMETRY: &str = "telemetry.bin";
+
+/// An image of the firmware.
+///
+/// # Panics
+/// If it is not built: a test that cannot run has not passed.
+pub fn image(name: &str) -> Image {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are in the workspace");
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+    let path = target.join("thumbv7em-none-eabihf/firmware").join(name);
+    Image::open(&path).unwrap_or_else(|error| panic!("{error} (or run `cargo xtask test`)"))
+}
+
+/// Runs an image with the settings in `folder`.
+///
+/// # Errors
+/// If it cannot be run or does not end in time.
+pub fn run(
+    image: &Image,
+    machine: Machine,
+    settings: &[String],
+    folder: &Path,
+    limit: Duration,
+) -> Result<Finished, RunError> {
+    qemu::run(image, machine, settings, folder, limit, |_| {})
+}
+
+/// Runs the ECU with a scenario to its end and reads its telemetry.
+///
+/// # Panics
+/// If the firmware does not end with `exit_code`, or its telemetry is damaged.
+pub fn record(scenario: &Scenario<f32>, machine: Machine, exit_code: i32) -> Recording {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let mut settings = settings::of(scenario);
+    settings.push(format!("telemetry={TELEMETRY}"));
+    let finished = run(&image("ecu"), machine, &settings, folder.path(), TIME_OUT)
+        .unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(finished.exit_code, exit_code, "log: {:?}", finished.log);
+    Recording::open(&folder.path().join(TELEMETRY)).unwrap_or_else(|error| panic!("{error}"))
+}

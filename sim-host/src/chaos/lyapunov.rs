@@ -12,13 +12,12 @@ use shared_model::Scenario;
 use shared_model::controller::Ecu;
 use shared_model::vehicle::State;
 
-/// Blocks end at every sixth maximum of the yaw rate, where a motion of period 1, 2, 3 or 6 is at the same phase again: the
-/// vector's stretching and shrinking within a cycle then cancels.
-const MAXIMA_IN_BLOCK: usize = 6;
-/// Fewest blocks for a standard error.
-const MIN_BLOCKS: usize = 4;
-/// Where there are no maxima (at rest), blocks of equal time.
-const BLOCKS_AT_REST: usize = 20;
+/// Fewest pieces for a standard error.
+const MIN_PIECES: usize = 16;
+/// Where the yaw rate has no maxima (at rest), pieces of equal time.
+const PIECES_AT_REST: usize = 64;
+/// Correlation of neighbours up to which a sequence is prewhitened.
+const GREATEST_CORRELATION: f64 = 0.97;
 /// Time in which the tangent vector turns into the direction of fastest growth, as a share of the motion.
 const WARM_UP: f64 = 0.1;
 
@@ -27,26 +26,24 @@ const WARM_UP: f64 = 0.1;
 pub struct Exponent {
     /// Mean growth rate, 1/s.
     pub per_s: f64,
-    /// Standard error from the scatter of block means, 1/s.
+    /// Standard error, 1/s; see [`largest`].
     pub standard_error_per_s: f64,
     /// Length of the motion that it is taken over, s.
     pub duration_s: f64,
 }
 
 impl Exponent {
-    /// The exponent from growths (of the logarithm) and lengths (s) of blocks.
-    fn from_blocks(blocks: &[(f64, f64)]) -> Self {
-        let n = blocks.len() as f64;
-        let duration_s: f64 = blocks.iter().map(|&(_, length)| length).sum();
-        let mean = blocks.iter().map(|&(growth, _)| growth).sum::<f64>() / duration_s;
-        // Scatter of the growths about the mean rate, blocks being nearly equally long.
-        let squares: f64 = blocks
+    /// The exponent from growths (of the logarithm) and lengths (s) of successive pieces.
+    fn from_pieces(pieces: &[(f64, f64)]) -> Self {
+        let duration_s: f64 = pieces.iter().map(|&(_, length)| length).sum();
+        let mean = pieces.iter().map(|&(growth, _)| growth).sum::<f64>() / duration_s;
+        let excess: Vec<f64> = pieces
             .iter()
-            .map(|&(growth, length)| (growth - mean * length).powi(2))
-            .sum();
+            .map(|&(growth, length)| growth - mean * length)
+            .collect();
         Self {
             per_s: mean,
-            standard_error_per_s: (squares * n / (n - 1.0)).sqrt() / duration_s,
+            standard_error_per_s: long_run_variance_sum(&excess).sqrt() / duration_s,
             duration_s,
         }
     }
@@ -62,6 +59,27 @@ impl Exponent {
     }
 }
 
+/// Variance of the sum of a correlated sequence of mean zero: prewhitened by a first-order autoregression, then with
+/// Bartlett weights over as many lags as the root of the length. D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953.
+fn long_run_variance_sum(sequence: &[f64]) -> f64 {
+    let covariance = |x: &[f64], lag: usize| -> f64 {
+        x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum()
+    };
+    let variance = covariance(sequence, 0);
+    if variance == 0.0 {
+        return 0.0;
+    }
+    let rho = (covariance(sequence, 1) / variance).clamp(-GREATEST_CORRELATION, GREATEST_CORRELATION);
+    let white: Vec<f64> = sequence.windows(2).map(|x| x[1] - rho * x[0]).collect();
+    let lags = (white.len() as f64).sqrt() as usize;
+    let weighted = (1..=lags).map(|lag| {
+        let weight = 1.0 - lag as f64 / (lags + 1) as f64;
+        2.0 * weight * covariance(&white, lag)
+    });
+    let sum = covariance(&white, 0) + weighted.sum::<f64>();
+    sum.max(0.0) / (1.0 - rho).powi(2)
+}
+
 impl std::fmt::Display for Exponent {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
@@ -74,19 +92,23 @@ impl std::fmt::Display for Exponent {
 
 /// Largest exponent along the recorded motion of a scenario from the state with index `from` on. `None` if the motion is too
 /// short for a standard error, or not finite.
+///
+/// The motion is cut at the maxima of the yaw rate, where a periodic motion is at the same phase again. Within a cycle the
+/// vector stretches and shrinks, and what one piece has too much its neighbour has too little, so the standard error takes
+/// the pieces' correlation into account.
 pub fn largest(scenario: &Scenario<f64>, trace: &Trace, from: usize) -> Option<Exponent> {
     let growth = tangent_growth(scenario, trace)?;
     let warm = from + ((trace.states.len() - from) as f64 * WARM_UP) as usize;
-    let ends = block_ends(trace, warm);
-    if ends.len() < MIN_BLOCKS + 1 {
+    let ends = piece_ends(trace, warm);
+    if ends.len() <= MIN_PIECES {
         return None;
     }
-    let block = |ends: &[usize]| {
+    let piece = |ends: &[usize]| {
         let length = (ends[1] - ends[0]) as f64 * trace.step_s;
         (growth[ends[1]] - growth[ends[0]], length)
     };
-    let blocks: Vec<_> = ends.windows(2).map(block).collect();
-    let exponent = Exponent::from_blocks(&blocks);
+    let pieces: Vec<_> = ends.windows(2).map(piece).collect();
+    let exponent = Exponent::from_pieces(&pieces);
     exponent.per_s.is_finite().then_some(exponent)
 }
 
@@ -110,13 +132,13 @@ fn tangent_growth(scenario: &Scenario<f64>, trace: &Trace) -> Option<Vec<f64>> {
     Some(growth)
 }
 
-/// Indices of the states at which blocks end and begin.
-fn block_ends(trace: &Trace, from: usize) -> Vec<usize> {
+/// Indices of the states at which pieces end and begin.
+fn piece_ends(trace: &Trace, from: usize) -> Vec<usize> {
     let maxima = yaw_rate_maxima(trace, from);
-    if maxima.len() >= MAXIMA_IN_BLOCK {
-        let index = |&(time_s, _): &(f64, f64)| (time_s / trace.step_s).round() as usize - 1;
-        return maxima.iter().step_by(MAXIMA_IN_BLOCK).map(index).collect();
+    if maxima.is_empty() {
+        let piece = (trace.states.len() - from) / PIECES_AT_REST;
+        return (from..trace.states.len()).step_by(piece.max(1)).collect();
     }
-    let block = (trace.states.len() - from) / BLOCKS_AT_REST;
-    (from..trace.states.len()).step_by(block.max(1)).collect()
+    let index = |&(time_s, _): &(f64, f64)| (time_s / trace.step_s).round() as usize - 1;
+    maxima.iter().map(index).collect()
 }

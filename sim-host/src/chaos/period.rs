@@ -8,7 +8,11 @@ const MAX_PERIOD: usize = 16;
 /// Repetitions of the cycle that must be seen.
 const MIN_REPETITIONS: usize = 3;
 /// Maxima count as equal when they differ by at most this share of the yaw rate's range.
-const TOLERANCE: f64 = 2e-3;
+pub const TOLERANCE: f64 = 2e-3;
+/// The same under the true dither signal, whose ripple the maxima ride on.
+pub const RIPPLE_TOLERANCE: f64 = 1e-2;
+/// Height over its surroundings at which a maximum counts, as a share of the yaw rate's range.
+const PROMINENCE: f64 = 1e-2;
 /// A yaw rate that varies by less than this is at rest, rad/s.
 const AT_REST_RAD_PER_S: f64 = 1e-6;
 
@@ -64,24 +68,48 @@ impl std::fmt::Display for Period {
 }
 
 /// Time (s) and height (rad/s) of each local maximum of the yaw rate from state index `from` on, each from the parabola
-/// through its three highest samples.
+/// through its three highest samples. A maximum counts if the yaw rate rises to it and falls from it by a hundredth of its
+/// range: a ripple makes none.
 pub fn yaw_rate_maxima(trace: &Trace, from: usize) -> Vec<(f64, f64)> {
     let gamma: Vec<f64> = trace.component(YAW_RATE).skip(from).collect();
-    let peak = |(k, w): (usize, &[f64])| {
-        let (left, top, right) = (w[0], w[1], w[2]);
-        if !(left < top && top >= right) {
-            return None;
-        }
-        let curvature = left - 2.0 * top + right;
-        let offset = 0.5 * (left - right) / curvature;
+    let (low, high) = trace.range(YAW_RATE, from);
+    let interpolate = |k: usize| {
+        let (left, top, right) = (gamma[k - 1], gamma[k], gamma[k + 1]);
+        let offset = 0.5 * (left - right) / (left - 2.0 * top + right);
         let height = top - 0.25 * (left - right) * offset;
-        Some((trace.time_s(from + k + 1) + offset * trace.step_s, height))
+        (trace.time_s(from + k) + offset * trace.step_s, height)
     };
-    gamma.windows(3).enumerate().filter_map(peak).collect()
+    let peaks = prominent_maxima(&gamma, PROMINENCE * (high - low));
+    peaks.into_iter().map(interpolate).collect()
 }
 
-/// Period of the motion from state index `from` on.
-pub fn period(trace: &Trace, from: usize) -> Period {
+/// Indices of the maxima to which `values` rise by at least `prominence`, and from which they fall by as much.
+fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
+    let mut maxima = Vec::new();
+    let mut rising = false;
+    // The furthest point in the present direction.
+    let mut extreme = 0;
+    for (k, &value) in values.iter().enumerate() {
+        let beyond = if rising {
+            value > values[extreme]
+        } else {
+            value < values[extreme]
+        };
+        if beyond {
+            extreme = k;
+        } else if (value - values[extreme]).abs() > prominence {
+            if rising {
+                maxima.push(extreme);
+            }
+            rising = !rising;
+            extreme = k;
+        }
+    }
+    maxima
+}
+
+/// Period of the motion from state index `from` on; maxima count as equal within `tolerance` of the yaw rate's range.
+pub fn period(trace: &Trace, from: usize, tolerance: f64) -> Period {
     let (low, high) = trace.range(YAW_RATE, from);
     if high - low < AT_REST_RAD_PER_S {
         return Period::Equilibrium;
@@ -95,7 +123,7 @@ pub fn period(trace: &Trace, from: usize) -> Period {
     let mut least = f64::INFINITY;
     for n in 1..=MAX_PERIOD.min(maxima.len() / (MIN_REPETITIONS + 1)) {
         let residual = residual(&maxima, n) / (high - low);
-        if residual <= TOLERANCE {
+        if residual <= tolerance {
             let (time_s, time_spread_s) = cycle_time(&maxima, n);
             return Period::Periodic {
                 maxima: n,

@@ -2,7 +2,7 @@
 
 use super::ReportInput;
 use super::figure::Figure;
-use super::text::{by_run, counts, limit, measured, status_word};
+use super::text::{by_run, counts, limit, measured, run_of, status_word};
 use crate::verdict::{Check, Status};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
@@ -20,13 +20,19 @@ pub fn page(input: &ReportInput, figures: &[Figure]) -> Markup {
             body {
                 h1 { (input.title) }
                 (banner(input))
-                h2 { "Checks" }
+                (not_passed(input))
+                nav {
+                    a href="#checks" { "Checks" }
+                    @if !input.notes.is_empty() { a href="#notes" { "Notes" } }
+                    a href="#figures" { "Figures" }
+                }
+                h2 #checks { "Checks" }
                 (checks(input))
                 @if !input.notes.is_empty() {
-                    h2 { "Notes" }
+                    h2 #notes { "Notes" }
                     (notes(input.notes))
                 }
-                h2 { "Figures" }
+                h2 #figures { "Figures" }
                 @for figure in figures {
                     figure id=(figure.name) {
                         div.drawing { (PreEscaped(&figure.svg)) }
@@ -49,6 +55,26 @@ fn banner(input: &ReportInput) -> Markup {
             strong { (word) }
             " "
             span { (counts(input.verdict)) }
+        }
+    }
+}
+
+/// The checks that did not pass, so that they need not be looked for.
+fn not_passed(input: &ReportInput) -> Markup {
+    let checks = || input.verdict.checks.iter();
+    let rest = || checks().filter(|check| check.status != Status::Passed);
+    html! {
+        @if rest().next().is_some() {
+            ul {
+                @for check in rest() {
+                    li {
+                        (status(check)) " "
+                        a href={ "#" (check.id) } {
+                            (run_title(input, run_of(check))) ": " (check.title)
+                        }
+                    }
+                }
+            }
         }
     }
 }
@@ -82,21 +108,25 @@ fn run_title<'a>(input: &ReportInput<'a>, id: &'a str) -> &'a str {
 }
 
 fn row(check: &Check) -> Markup {
-    let status = status_word(check.status);
-    let symbol = match check.status {
-        Status::Passed => "\u{2713}",
-        Status::Failed => "\u{2717}",
-        Status::Untested => "?",
-    };
     html! {
         tr id=(check.id) {
             th scope="row" { (check.title) }
             td.figure data-name="Measured" { (measured(check)) }
             td.figure data-name="Limit" { (limit(check)) }
-            td data-name="Status" { span class={ "status " (status) } { (symbol) " " (status) } }
+            td data-name="Status" { (status(check)) }
             td.detail { (check.detail) }
         }
     }
+}
+
+fn status(check: &Check) -> Markup {
+    let word = status_word(check.status);
+    let symbol = match check.status {
+        Status::Passed => "\u{2713}",
+        Status::Failed => "\u{2717}",
+        Status::Untested => "?",
+    };
+    html! { span class={ "status " (word) } { (symbol) " " (word) } }
 }
 
 fn notes(notes: &[(String, String)]) -> Markup {
@@ -122,6 +152,10 @@ h2 { font-size: 1.25rem; margin: 2rem 0 0.6rem; }
 .passed { color: #0f4a1c; background: #e4f4e7; border-color: #2c7a3c; }
 .failed { color: #7d0c0c; background: #fde6e6; border-color: #b31b1b; }
 .untested { color: #5a3c00; background: #fff2cc; border-color: #b58900; }
+ul { list-style: none; margin: 1rem 0 0; padding: 0; }
+li { margin: 0.3rem 0; }
+nav { display: flex; gap: 1.2rem; margin-top: 1rem; }
+a { color: #123f8c; }
 table { border-collapse: collapse; width: 100%; }
 th, td { text-align: left; vertical-align: top; padding: 0.35rem 0.6rem;
   border-bottom: 1px solid #d5d5d5; }
@@ -148,6 +182,7 @@ figcaption { font-size: 0.95rem; color: #404040; margin-top: 0.3rem; }
 @media print {
   body { max-width: none; padding: 0; font-size: 10pt; }
   .drawing svg { min-width: 0; max-height: 24cm; }
+  nav { display: none; }
   thead { display: table-header-group; }
   tr { break-inside: avoid; }
   .banner, .status { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
@@ -195,7 +230,7 @@ mod tests {
         };
         let page = sample_page(&[figure]);
         assert!(page.contains("<svg></svg>"));
-        for outside in ["src=", "href=", "url(", "@import", "<script"] {
+        for outside in ["src=", "href=\"h", "url(", "@import", "<script"] {
             assert!(!page.contains(outside), "{outside}");
         }
     }

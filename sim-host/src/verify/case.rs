@@ -2,7 +2,7 @@
 
 use super::{Options, Progress, VerifyError};
 use crate::chaos::lyapunov::{self, Exponent};
-use crate::chaos::period::{Period, period};
+use crate::chaos::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
 use crate::equivalence::{self, Bits, OneStep};
 use crate::pil::qemu::{self, Finished, Machine};
 use crate::pil::settings;
@@ -23,11 +23,11 @@ use std::time::Duration;
 /// Transient of the paper's start before a run begins, s.
 const TRANSIENT_S: f64 = 200.0;
 /// Transient after the dither has set in, s.
-const DITHER_TRANSIENT_S: f64 = 10.0;
+pub(super) const DITHER_TRANSIENT_S: f64 = 20.0;
 /// Length of the host's run that gives the motion's invariants, s.
 const LONG_RUN_S: f64 = 600.0;
 /// Greatest length of runs that are not compared on all levels, s.
-const SIGNAL_RUN_S: f64 = 30.0;
+const SIGNAL_RUN_S: f64 = 40.0;
 const SECOND_CORE_RUN_S: f64 = 10.0;
 const TELEMETRY: &str = "telemetry.bin";
 /// How often the progress of a run is looked at.
@@ -191,10 +191,14 @@ pub(super) fn run(
         _ => firmware.index_after(case.scenario.dither.start_time_s + DITHER_TRANSIENT_S),
     };
     let all_levels = matches!(case.role, Role::Chaos | Role::Dithered(_) | Role::Region);
+    let tolerance = match case.role {
+        Role::Signal(_) => RIPPLE_TOLERANCE,
+        _ => TOLERANCE,
+    };
     let analysis = all_levels.then(|| analyse(&case.scenario, &firmware)).transpose()?;
     Ok(Outcome {
         bits: equivalence::bits(&firmware, &host),
-        period: period(&firmware, settled),
+        period: period(&firmware, settled, tolerance),
         exponent: lyapunov::largest(&case.scenario, &firmware, settled),
         analysis,
         settled,
@@ -213,7 +217,7 @@ fn analyse(scenario: &Scenario<f64>, firmware: &Trace) -> Result<Analysis, Verif
     Ok(Analysis {
         one_step: equivalence::one_step(scenario, firmware)?,
         divergence: equivalence::divergence(firmware, &long),
-        long_period: period(&long, from),
+        long_period: period(&long, from, TOLERANCE),
         long_exponent: lyapunov::largest(&longer, &long, from),
         long,
     })

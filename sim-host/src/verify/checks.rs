@@ -1,6 +1,6 @@
 //! The checks of a verification: the four levels of equivalence, and what the firmware needs.
 
-use super::case::{Analysis, Expected, Outcome, Role};
+use super::case::{Analysis, DITHER_TRANSIENT_S, Expected, Outcome, Role};
 use crate::equivalence;
 use crate::pil::elf::Image;
 use crate::verdict::{Check, figure};
@@ -88,7 +88,7 @@ fn horizon(outcome: &Outcome, analysis: &Analysis) -> Check {
 
 fn invariants(outcome: &Outcome, analysis: &Analysis) -> Vec<Check> {
     let (firmware, long) = (&outcome.firmware, &analysis.long);
-    let settled_s = outcome.case.scenario.dither.start_time_s + 10.0;
+    let settled_s = outcome.case.scenario.dither.start_time_s + DITHER_TRANSIENT_S;
     let (from, long_from) = (outcome.settled, long.index_after(settled_s));
     let periodic = analysis.long_period.maxima().is_some();
 

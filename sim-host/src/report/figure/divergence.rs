@@ -5,14 +5,20 @@ use super::panel::{Panel, stack, stack_height};
 use super::reduce::{Point, maxima};
 use super::style::{Area, INSTANT, LIMIT, Line, RUNS, Sample, figure};
 use crate::report::RunReport;
+use crate::verdict;
 
 const BUCKETS: usize = 400;
 const PANEL: u32 = 340;
 const ROOM: f64 = 1.2;
 
-/// The figure: a panel for each run that chaos parts, and one for those that must never part.
+/// The figure: a panel for each run that chaos parts, and one for those that must never part. Runs
+/// without distances are left out.
 pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
-    let styled: Vec<(&RunReport, Line)> = runs.iter().zip(RUNS.into_iter().cycle()).collect();
+    let styled: Vec<(&RunReport, Line)> = runs
+        .iter()
+        .filter(|run| !run.divergence.is_empty())
+        .zip(RUNS.into_iter().cycle())
+        .collect();
     let mut legend: Vec<_> = styled
         .iter()
         .map(|(run, line)| (run.title.clone(), Sample::Line(*line)))
@@ -26,12 +32,20 @@ pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
         legend.push(("expected".into(), Sample::Line(INSTANT)));
     }
     // A panel for each horizon, so that it is clear whose it is.
-    let mut groups: Vec<(String, Vec<(&RunReport, Line)>)> = parting
+    let mut groups: Vec<Group> = parting
         .into_iter()
-        .map(|run| (format!("must part: {}", run.0.title), vec![run]))
+        .map(|run| Group {
+            caption: format!("must part: {}", run.0.title),
+            remark: run.0.horizon_s.map_or(String::new(), horizon_text),
+            runs: vec![run],
+        })
         .collect();
     if !bounded.is_empty() {
-        groups.push(("must never part: the other runs".into(), bounded));
+        groups.push(Group {
+            caption: "must never reach the limit".into(),
+            remark: String::new(),
+            runs: bounded,
+        });
     }
     let heading = "Divergence of f32 and f64 against the predicted horizon";
     let height = stack_height(groups.len().max(1), PANEL);
@@ -53,38 +67,39 @@ pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
         );
         let end_s = end_s(runs, values().map(|p| p.0).fold(0.0, f64::max));
         let rows = stack(area, groups.len(), PANEL, "time (s)");
-        for ((area, time), (caption, runs)) in rows.iter().zip(&groups) {
-            panel(
-                area,
-                caption,
-                Axis::linear(time, 0.0, end_s, 12),
-                y.clone(),
-                runs,
-            )?;
+        for ((area, time), group) in rows.iter().zip(&groups) {
+            panel(area, group, Axis::linear(time, 0.0, end_s, 12), y.clone())?;
         }
         if groups.is_empty() {
-            Panel::new(area, "", Axis::linear("time (s)", 0.0, 1.0, 5), y)?.no_data()?;
+            Panel::new(area, ("", ""), Axis::linear("time (s)", 0.0, 1.0, 5), y)?.no_data()?;
         }
         Ok(())
     })
 }
 
-/// End of the time axis: that of the runs, or somewhat later to show a horizon behind it.
+/// Runs that share a panel.
+struct Group<'a> {
+    caption: String,
+    remark: String,
+    runs: Vec<(&'a RunReport, Line)>,
+}
+
+fn horizon_text([least, expected, greatest]: [f64; 3]) -> String {
+    let [least, expected, greatest] = [least, expected, greatest].map(verdict::figure);
+    format!("predicted at {expected} s, {least} to {greatest} s")
+}
+
+/// End of the time axis: that of the runs, or somewhat later to show when one was expected to part.
 fn end_s(runs: &[RunReport], data_end_s: f64) -> f64 {
     runs.iter()
         .filter_map(|run| run.horizon_s)
-        .map(|horizon| horizon[2].min(1.5 * data_end_s))
+        .map(|horizon| (1.05 * horizon[1]).min(1.5 * data_end_s))
         .fold(data_end_s, f64::max)
 }
 
-fn panel(
-    area: &Area,
-    caption: &str,
-    x: Axis,
-    y: Axis,
-    runs: &[(&RunReport, Line)],
-) -> anyhow::Result<()> {
-    let panel = Panel::new(area, caption, x, y)?;
+fn panel(area: &Area, group: &Group, x: Axis, y: Axis) -> anyhow::Result<()> {
+    let panel = Panel::new(area, (&group.caption, &group.remark), x, y)?;
+    let runs = &group.runs;
     for horizon in runs.iter().filter_map(|(run, _)| run.horizon_s) {
         panel.band(horizon[0], horizon[2])?;
     }

@@ -16,41 +16,55 @@ type Histogram = [(u32, u64)];
 /// Left end, right end and height of a bar.
 type Bar = (f64, f64, f64);
 
-/// The figure: a row for each run, the control task on the left, the PWM task on the right.
+/// The figure: a row for each run, named on the left; there the control task, on the right the PWM task.
 pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
     let heading = "Instructions of the control task (left) and of the PWM task (right)";
     figure(heading, &[], stack_height(runs.len(), PANEL), |area| {
         let (left, right) = area.split_horizontally(WIDTH / 2);
-        let rows = |histogram: fn(&RunReport) -> &Histogram| -> Vec<(&str, &Histogram)> {
-            runs.iter()
-                .map(|run| (run.title.as_str(), histogram(run)))
-                .collect()
-        };
-        let control = rows(|run| &run.control_instructions);
+        let control: Vec<Row> = runs
+            .iter()
+            .map(|run| Row {
+                caption: run.title.clone(),
+                histogram: &run.control_instructions,
+            })
+            .collect();
         column(&left, "instructions of a control task", &control)?;
-        let pwm = rows(|run| &run.pwm_instructions);
+        let pwm: Vec<Row> = runs
+            .iter()
+            .map(|run| Row {
+                caption: greatest(run),
+                histogram: &run.pwm_instructions,
+            })
+            .collect();
         column(&right, "instructions of a PWM task", &pwm)
     })
 }
 
+struct Row<'a> {
+    caption: String,
+    histogram: &'a Histogram,
+}
+
+fn greatest(run: &RunReport) -> String {
+    let control = run.control_instructions.last();
+    match control.zip(run.pwm_instructions.last()) {
+        Some(((control, _), (pwm, _))) => format!("greatest: {control} (left), {pwm} (right)"),
+        None => String::new(),
+    }
+}
+
 /// The histograms of one task on common axes.
-fn column(area: &Area, name: &str, rows: &[(&str, &Histogram)]) -> anyhow::Result<()> {
-    let all = || rows.iter().flat_map(|(_, histogram)| histogram.iter());
-    let x = Axis::around(name, all().map(|entry| f64::from(entry.0)), 9);
+fn column(area: &Area, name: &str, rows: &[Row]) -> anyhow::Result<()> {
+    let all = rows.iter().flat_map(|row| row.histogram);
+    let x = Axis::around(name, all.map(|entry| f64::from(entry.0)), 9);
     let width = ((x.high - x.low) / BARS).floor().max(1.0);
-    let bars: Vec<Vec<Bar>> = rows
-        .iter()
-        .map(|(_, histogram)| bars(histogram, width))
-        .collect();
+    let bars: Vec<Vec<Bar>> = rows.iter().map(|row| bars(row.histogram, width)).collect();
     let counts = bars.iter().flatten().map(|bar| bar.2);
     let y = Axis::decades("count", counts.chain([LEAST, 1.0]), 4);
     let panels = stack(area, rows.len(), PANEL, name);
-    for (((area, name), (title, histogram)), bars) in panels.iter().zip(rows).zip(&bars) {
-        let panel = Panel::new(area, title, x.named(name), y.clone())?;
+    for (((area, name), row), bars) in panels.iter().zip(rows).zip(&bars) {
+        let panel = Panel::new(area, (&row.caption, ""), x.named(name), y.clone())?;
         panel.bars(bars, MAIN.colour)?;
-        if let Some((most, _)) = histogram.last() {
-            panel.remark(&format!("greatest {most}"))?;
-        }
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use super::panel::{Panel, stack, stack_height};
 use super::reduce::{Point, maxima};
 use super::style::{LIMIT, MAIN, Sample, figure};
 use crate::report::RunReport;
+use crate::verdict;
 
 /// About one for each pixel.
 const BUCKETS: usize = 700;
@@ -12,36 +13,43 @@ const PANEL: u32 = 190;
 /// Where the axis begins: smaller defects are nothing to look at.
 const LEAST: f64 = 1e-4;
 
-/// The figure: a panel for each run.
+/// The figure: a panel for each run of which there are defects.
 pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
     let legend = [
         ("greatest defect over its bound".into(), Sample::Line(MAIN)),
         ("limit".into(), Sample::Line(LIMIT)),
     ];
-    let curves: Vec<(&str, Vec<Point>)> = runs
+    let mut curves: Vec<(&str, Vec<Point>)> = runs
         .iter()
+        .filter(|run| !run.one_step_defect.is_empty())
         .map(|run| {
             let points = run.one_step_defect.iter().copied();
             (run.title.as_str(), maxima(points, BUCKETS))
         })
         .collect();
+    if curves.is_empty() {
+        curves.push(("", Vec::new()));
+    }
     let heading = "One-step defect of the firmware against the host's f64 step";
     let height = stack_height(curves.len(), PANEL);
     figure(heading, &legend, height, |area| {
-        let all = || curves.iter().flat_map(|(_, points)| points);
         let times = runs.iter().flat_map(|run| &run.one_step_defect);
         let end_s = times.map(|point| point.0).fold(0.0, f64::max);
-        let values = all().map(|point| point.1.max(LEAST)).chain([0.1, 10.0]);
+        let all = curves.iter().flat_map(|(_, points)| points);
+        let values = all.map(|point| point.1.max(LEAST)).chain([0.1, 10.0]);
         let y = Axis::decades("defect / bound", values, 4);
         let rows = stack(area, curves.len(), PANEL, "time (s)");
         for ((area, time), (title, points)) in rows.iter().zip(&curves) {
+            let greatest = points.iter().map(|point| point.1).reduce(f64::max);
+            let remark = greatest.map_or(String::new(), |most| {
+                format!("greatest {}", verdict::figure(most))
+            });
             let x = Axis::linear(time, 0.0, end_s, 12);
-            let panel = Panel::new(area, title, x, y.clone())?;
-            panel.level(1.0, LIMIT)?;
-            panel.lines(&[(points, MAIN)])?;
-            if let Some(most) = points.iter().map(|point| point.1).reduce(f64::max) {
-                panel.remark(&format!("greatest {}", crate::verdict::figure(most)))?;
+            let panel = Panel::new(area, (title, &remark), x, y.clone())?;
+            if greatest.is_some() {
+                panel.level(1.0, LIMIT)?;
             }
+            panel.lines(&[(points, MAIN)])?;
         }
         Ok(())
     })

@@ -2,7 +2,9 @@
 
 use super::axis::Axis;
 use super::reduce::Point;
-use super::style::{Area, BAND, FAINT_INK, GRID, INK, Line, TEXT_FONT, TICK_FONT, text};
+use super::style::{
+    Area, BAND, FAINT_INK, GRID, INK, Line, TEXT_FONT, TICK_FONT, text, text_width,
+};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
@@ -51,8 +53,14 @@ pub struct Panel<'a> {
 }
 
 impl<'a> Panel<'a> {
-    /// Axes and grid on the area, with a caption above.
-    pub fn new(area: &Area<'a>, caption: &str, x: Axis, y: Axis) -> anyhow::Result<Self> {
+    /// Axes and grid on the area; above them a caption, shortened if it must be, and at the right end
+    /// a fainter remark.
+    pub fn new(
+        area: &Area<'a>,
+        (caption, remark): (&str, &str),
+        x: Axis,
+        y: Axis,
+    ) -> anyhow::Result<Self> {
         let below = if x.name.is_empty() {
             TICKS
         } else {
@@ -76,12 +84,14 @@ impl<'a> Panel<'a> {
             .bold_line_style(GRID.stroke_width(1))
             .set_all_tick_mark_size(TICK)
             .draw()?;
-        area.draw_text(
-            caption,
-            &text(TEXT_FONT, INK),
-            ((MARGIN + LEFT) as i32, CAPTION as i32 / 2),
-        )?;
-        Ok(Self { chart, x, y })
+        let panel = Self { chart, x, y };
+        let width = panel.chart.plotting_area().dim_in_pixel().0 as i32;
+        let remark_width = text_width(remark, TICK_FONT);
+        let caption = shortened(caption, width - remark_width);
+        panel.text_above(panel.x.low, HPos::Left, &caption, text(TEXT_FONT, INK))?;
+        let style = text(TICK_FONT, FAINT_INK);
+        panel.text_above(panel.x.high, HPos::Right, remark, style)?;
+        Ok(panel)
     }
 
     /// Width and height of the axes over the extents of the values on them.
@@ -157,12 +167,6 @@ impl<'a> Panel<'a> {
         Ok(())
     }
 
-    /// A faint text above the panel's right end.
-    pub fn remark(&self, remark: &str) -> anyhow::Result<()> {
-        let style = text(TICK_FONT, FAINT_INK);
-        self.text_above(self.x.high, HPos::Right, remark, style)
-    }
-
     fn text_above(
         &self,
         value: f64,
@@ -170,6 +174,9 @@ impl<'a> Panel<'a> {
         text: &str,
         style: TextStyle,
     ) -> anyhow::Result<()> {
+        if text.is_empty() {
+            return Ok(());
+        }
         let area = self.chart.plotting_area();
         let x = area.map_coordinate(&(value, self.y.high)).0 - area.get_base_pixel().0;
         let style = style.pos(Pos::new(anchor, VPos::Center));
@@ -197,5 +204,33 @@ impl<'a> Panel<'a> {
             area.draw(&Rectangle::new(corners, colour.filled()))?;
         }
         Ok(())
+    }
+}
+
+/// The text with as many of its characters as the width takes, and an ellipsis for the others.
+fn shortened(text: &str, width: i32) -> String {
+    if text_width(text, TEXT_FONT) <= width {
+        return text.into();
+    }
+    let mut short: Vec<char> = text.chars().collect();
+    while !short.is_empty() {
+        short.pop();
+        let candidate: String = short.iter().chain(['\u{2026}'].iter()).collect();
+        if text_width(&candidate, TEXT_FONT) <= width {
+            return candidate;
+        }
+    }
+    String::new()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_long_captions_are_shortened() {
+        assert_eq!(shortened("caption", 200), "caption");
+        assert_eq!(shortened("caption", 60), "cap\u{2026}");
+        assert_eq!(shortened("caption", 0), "");
     }
 }

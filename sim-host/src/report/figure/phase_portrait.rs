@@ -32,7 +32,7 @@ pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> anyhow::Resul
             (right, after, &states[1], MAIN, "after"),
         ] {
             let caption = format!("{word}: {}", run.title);
-            let panel = Panel::new(&area, &caption, x.clone(), y.clone())?;
+            let panel = Panel::new(&area, (&caption, ""), x.clone(), y.clone())?;
             orbit(&panel, states, line)?;
         }
         Ok(())

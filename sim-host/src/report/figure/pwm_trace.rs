@@ -35,19 +35,19 @@ pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
 
 fn panel(area: &Area, time: &str, run: &RunReport, start_s: f64) -> anyhow::Result<()> {
     let steps = steps(run, start_s);
+    let count = format!(
+        "1 count = {} mV = {} % duty",
+        verdict::figure(run.volts_per_count * 1e3),
+        verdict::figure(100.0 / f64::from(run.trace.pwm_period)),
+    );
     let panel = Panel::new(
         area,
-        &run.title,
+        (&run.title, &count),
         Axis::linear(time, FROM_MS, TO_MS, 15),
         Axis::around("voltage (V)", steps.iter().map(|point| point.1), 5),
     )?;
     panel.lines(&[(&steps, MAIN)])?;
-    panel.instant(0.0, INSTANT)?;
-    panel.remark(&format!(
-        "1 count = {} mV = {} % duty",
-        verdict::figure(run.volts_per_count * 1e3),
-        verdict::figure(100.0 / f64::from(run.trace.pwm_period)),
-    ))
+    panel.instant(0.0, INSTANT)
 }
 
 /// Both ends of each PWM period that is shown: milliseconds and volts.

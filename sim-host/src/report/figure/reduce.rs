@@ -29,15 +29,15 @@ pub fn maxima(points: impl IntoIterator<Item = Point>, buckets: usize) -> Vec<Po
         .collect()
 }
 
-/// The curve with at most `most` points, none of the others further from it than a tolerance: half a
-/// unit of the picture, or as much as `most` needs. `scale` is units of the picture per unit of the axes.
+/// The curve with at most `most` points, none of the others further from it than a tolerance: a fifth
+/// of a unit of the picture, or as much as `most` needs. `scale` is units of the picture per unit of the axes.
 pub fn curve(points: impl IntoIterator<Item = Point>, scale: Point, most: usize) -> Vec<Point> {
     let points = finite(points);
     let scaled: Vec<Point> = points
         .iter()
         .map(|point| (bounded(point.0 * scale.0), bounded(point.1 * scale.1)))
         .collect();
-    let mut tolerance = 0.5;
+    let mut tolerance = 0.2;
     loop {
         let kept = corners(&scaled, tolerance);
         if kept.len() <= most.max(2) {
@@ -181,7 +181,7 @@ mod tests {
                 .windows(2)
                 .map(|pair| distance(point, pair[0], pair[1]))
                 .fold(f64::MAX, f64::min);
-            assert!(nearest * 300.0 <= 0.51, "{nearest}");
+            assert!(nearest * 300.0 <= 0.21, "{nearest}");
         }
     }
 }

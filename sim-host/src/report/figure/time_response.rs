@@ -35,7 +35,7 @@ pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> anyhow::Resul
             let values = with.iter().chain(&without).map(|point| point.1);
             let panel = Panel::new(
                 &area,
-                "",
+                ("", ""),
                 Axis::linear(time, 0.0, end_s, 15),
                 Axis::around(name, values, 6),
             )?;

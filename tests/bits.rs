@@ -1,0 +1,129 @@
+//! Level 1 of the equivalence: the firmware's f32 run equals the host's, word for word, in every form of the model.
+
+use shared_model::Scenario;
+use shared_model::dither::{Application, Waveform};
+use shared_model::friction::FrictionLaw;
+use shared_model::tire::TireModel;
+use shared_model::vehicle::SlipForm;
+use sim_host::equivalence::bits;
+use sim_host::pil::qemu::Machine;
+use sim_host::simulate::simulate;
+use sim_host::trace::Trace;
+use tests::record;
+
+/// A short run with the dither from its first quarter on.
+fn scenario(waveform: Waveform, application: Application) -> Scenario<f32> {
+    let mut scenario = Scenario::reconstruction();
+    scenario.run.duration_s = 2.0;
+    scenario.dither.start_time_s = 0.5;
+    scenario.dither.waveform = waveform;
+    scenario.dither.application = application;
+    scenario.dither.amplitude_v = match waveform {
+        Waveform::Sine => 1.0,
+        _ => 0.1,
+    };
+    scenario
+}
+
+fn assert_same_bits(scenario: &Scenario<f32>, machine: Machine) {
+    let firmware = record(scenario, machine, 0).trace();
+    let host = simulate(scenario).expect("the scenario is valid");
+    let bits = bits(&firmware, &host);
+    assert_eq!(bits.differing, 0, "{:?} in {scenario:?}", bits.first);
+    let words = host.states.len() * 5 + host.duties.len();
+    assert_eq!(bits.compared, words + 5, "everything was compared");
+}
+
+#[test]
+fn every_waveform_and_application() {
+    for waveform in [Waveform::None, Waveform::Square, Waveform::Sine] {
+        for application in [Application::Averaged, Application::Signal] {
+            assert_same_bits(&scenario(waveform, application), Machine::Mps2An386);
+        }
+    }
+}
+
+#[test]
+fn every_friction_law_dithered_and_not() {
+    for law in [FrictionLaw::None, FrictionLaw::CoulombRate, FrictionLaw::PrintedAngle] {
+        for dithered in [false, true] {
+            for waveform in [Waveform::Square, Waveform::Sine] {
+                let mut scenario = scenario(waveform, Application::Averaged);
+                scenario.friction.law = law;
+                scenario.friction.dithered = dithered;
+                assert_same_bits(&scenario, Machine::Mps2An386);
+            }
+        }
+    }
+}
+
+#[test]
+fn magic_formula_and_exact_slip() {
+    for waveform in [Waveform::None, Waveform::Square, Waveform::Sine] {
+        let mut scenario = scenario(waveform, Application::Averaged);
+        scenario.tires.model = TireModel::MagicFormula;
+        scenario.vehicle.slip_form = SlipForm::Exact;
+        // The mean of the Magic Formula over a sine takes half a million instructions a step.
+        scenario.run.control_rate_hz = 20.0;
+        assert_same_bits(&scenario, Machine::Mps2An386);
+    }
+}
+
+#[test]
+fn other_core_same_image_same_bits() {
+    for waveform in [Waveform::None, Waveform::Sine] {
+        assert_same_bits(&scenario(waveform, Application::Signal), Machine::Mps2An500);
+    }
+}
+
+#[test]
+fn other_rates() {
+    let mut scenario = scenario(Waveform::Sine, Application::Averaged);
+    scenario.run.control_rate_hz = 500.0;
+    scenario.run.pwm_rate_hz = 20_000.0;
+    assert_same_bits(&scenario, Machine::Mps2An386);
+}
+
+#[test]
+fn the_same_run_twice_gives_the_same_telemetry() {
+    let scenario = scenario(Waveform::Sine, Application::Signal);
+    let (a, b) = (
+        record(&scenario, Machine::Mps2An386, 0),
+        record(&scenario, Machine::Mps2An386, 0),
+    );
+    assert_eq!(a.duties, b.duties);
+    // Also the instructions of every task: virtual time is counted in them.
+    assert_eq!(a.records, b.records);
+}
+
+/// The comparison must be able to fail: one flipped bit anywhere is seen, and named.
+#[test]
+fn one_flipped_bit_is_seen() {
+    let scenario = scenario(Waveform::Square, Application::Averaged);
+    let host = simulate(&scenario).expect("the scenario is valid");
+    let firmware = record(&scenario, Machine::Mps2An386, 0).trace();
+    let differing = |change: &dyn Fn(&mut Trace)| {
+        let mut changed = firmware.clone();
+        change(&mut changed);
+        bits(&changed, &host)
+    };
+    assert_eq!(differing(&|_| {}).differing, 0);
+    for component in 0..4 {
+        for bit in [0, 12, 22, 30] {
+            let flipped = differing(&|trace| {
+                let value = &mut trace.states[1234].x[component];
+                *value = f32::from_bits((*value as f32).to_bits() ^ (1 << bit)).into();
+            });
+            assert_eq!(flipped.differing, 1, "bit {bit} of component {component}");
+            let first = flipped.first.expect("the first difference is named");
+            assert!(first.starts_with(&format!("component {component} after step 1235")), "{first}");
+        }
+    }
+    for bit in 0..16 {
+        let flipped = differing(&|trace| trace.duties[777] ^= 1 << bit);
+        assert_eq!(flipped.differing, 1, "bit {bit} of a duty code");
+        assert!(flipped.first.expect("named").starts_with("duty code 777"));
+    }
+    let short = differing(&|trace| trace.states.truncate(1999));
+    assert_eq!(short.differing, 1, "a missing state counts");
+}
