@@ -45,7 +45,11 @@ fn every_waveform_and_application() {
 
 #[test]
 fn every_friction_law_dithered_and_not() {
-    for law in [FrictionLaw::None, FrictionLaw::CoulombRate, FrictionLaw::PrintedAngle] {
+    for law in [
+        FrictionLaw::None,
+        FrictionLaw::CoulombRate,
+        FrictionLaw::PrintedAngle,
+    ] {
         for dithered in [false, true] {
             for waveform in [Waveform::Square, Waveform::Sine] {
                 let mut scenario = scenario(waveform, Application::Averaged);
@@ -116,7 +120,10 @@ fn one_flipped_bit_is_seen() {
             });
             assert_eq!(flipped.differing, 1, "bit {bit} of component {component}");
             let first = flipped.first.expect("the first difference is named");
-            assert!(first.starts_with(&format!("component {component} after step 1235")), "{first}");
+            assert!(
+                first.starts_with(&format!("component {component} after step 1235")),
+                "{first}"
+            );
         }
     }
     for bit in 0..16 {

@@ -16,8 +16,14 @@ fn each_fault_neutralises_the_pwm_and_has_its_exit_code() {
     for (fault, exit_code) in [("panic", 13), ("hard-fault", 14), ("watchdog", 15)] {
         for machine in [Machine::Mps2An386, Machine::Mps2An500] {
             let folder = tempfile::tempdir().expect("a temporary folder can be made");
-            let finished = run(&image("fault-drill"), machine, &[fault.into()], folder.path(), TIME_OUT)
-                .unwrap_or_else(|error| panic!("{fault}: {error}"));
+            let finished = run(
+                &image("fault-drill"),
+                machine,
+                &[fault.into()],
+                folder.path(),
+                TIME_OUT,
+            )
+            .unwrap_or_else(|error| panic!("{fault}: {error}"));
             assert_eq!(finished.exit_code, exit_code, "{fault}");
             let recording = Recording::open(&folder.path().join("drill.bin"))
                 .unwrap_or_else(|error| panic!("{fault}: {error}"));
@@ -25,7 +31,11 @@ fn each_fault_neutralises_the_pwm_and_has_its_exit_code() {
             assert_eq!(trailer.exit_code, exit_code as u32, "{fault}");
             // The drill drives the PWM to full duty before the fault.
             assert_eq!(trailer.final_duty, trailer.neutral_duty, "{fault}");
-            assert_eq!(trailer.neutral_duty, recording.header.pwm_period / 2, "{fault}");
+            assert_eq!(
+                trailer.neutral_duty,
+                recording.header.pwm_period / 2,
+                "{fault}"
+            );
         }
     }
 }
@@ -37,8 +47,14 @@ fn a_firmware_that_hangs_is_stopped_and_gone() {
     let limit = Duration::from_secs(2);
     let start = Instant::now();
     let settings = ["hang".into(), marker.clone()];
-    let error = run(&image("fault-drill"), Machine::Mps2An386, &settings, folder.path(), limit)
-        .expect_err("it hangs");
+    let error = run(
+        &image("fault-drill"),
+        Machine::Mps2An386,
+        &settings,
+        folder.path(),
+        limit,
+    )
+    .expect_err("it hangs");
     assert!(matches!(error, RunError::TimedOut { .. }), "{error}");
     assert!(start.elapsed() >= limit);
     assert!(!is_running(&marker), "the emulator is left behind");

@@ -10,17 +10,29 @@ const TELEMETRY_FAILED: i32 = 11;
 fn outcome(settings: &[&str]) -> (i32, String) {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let settings: Vec<String> = settings.iter().map(|&setting| setting.into()).collect();
-    let finished = run(&image("ecu"), Machine::Mps2An386, &settings, folder.path(), TIME_OUT)
-        .unwrap_or_else(|error| panic!("{error}"));
+    let finished = run(
+        &image("ecu"),
+        Machine::Mps2An386,
+        &settings,
+        folder.path(),
+        TIME_OUT,
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
     let entries = std::fs::read_dir(folder.path()).expect("the folder is there");
     assert_eq!(entries.count(), 0, "a refused run writes nothing");
-    (finished.exit_code, finished.log.last().cloned().unwrap_or_default())
+    (
+        finished.exit_code,
+        finished.log.last().cloned().unwrap_or_default(),
+    )
 }
 
 #[test]
 fn bad_scenarios_are_refused_by_name() {
-    let cases: [(&[&str], &[&str]); 14] = [
-        (&["run.wheel_speed_rpm=0"], &["run.wheel_speed_rpm = 0", "from 1"]),
+    let cases: [(&[&str], &[&str]); 15] = [
+        (
+            &["run.wheel_speed_rpm=0"],
+            &["run.wheel_speed_rpm = 0", "from 1"],
+        ),
         (&["vehicle.mass_kg=-1500"], &["vehicle.mass_kg = -1500"]),
         (&["vehicle.mass_kg=nan"], &["vehicle.mass_kg = NaN"]),
         (&["run.sideslip_rad=inf"], &["run.sideslip_rad = inf"]),
@@ -28,11 +40,30 @@ fn bad_scenarios_are_refused_by_name() {
         (&["run.control_rate_hz=-1"], &["run.control_rate_hz = -1"]),
         (&["run.control_rate_hz=0"], &["run.control_rate_hz = 0"]),
         (&["run.pwm_rate_hz=10500"], &["multiple"]),
-        (&["run.pwm_rate_hz=100", "run.control_rate_hz=100"], &["250000 timer counts", "2 to 65535"]),
-        (&["dither.waveform=square", "dither.amplitude_v=11"], &["amplitude_v = 11", "bus_voltage_v = 12"]),
-        (&["run.weel_speed_rpm=1600"], &["run.weel_speed_rpm=1600", "no parameter of that name"]),
+        (
+            &["run.pwm_rate_hz=100", "run.control_rate_hz=100"],
+            &["250000 timer counts", "2 to 65535"],
+        ),
+        (
+            &["dither.waveform=square", "dither.amplitude_v=11"],
+            &["amplitude_v = 11", "bus_voltage_v = 12"],
+        ),
+        (
+            &[
+                "dither.waveform=square",
+                "dither.square_frequency_rad_per_s=40000",
+            ],
+            &["dither frequency 40000", "half the PWM rate"],
+        ),
+        (
+            &["run.weel_speed_rpm=1600"],
+            &["run.weel_speed_rpm=1600", "no parameter of that name"],
+        ),
         (&["run.wheel_speed_rpm=fast"], &["not a number"]),
-        (&["friction.law=sticky"], &["friction.law=sticky", "none of the parameter's names"]),
+        (
+            &["friction.law=sticky"],
+            &["friction.law=sticky", "none of the parameter's names"],
+        ),
         (&["run.wheel_speed_rpm"], &["must be key=value"]),
     ];
     for (settings, parts) in cases {

@@ -86,6 +86,14 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             min_s,
             max_s
         ),
+        InvalidScenario::DitherFrequency {
+            frequency_rad_per_s,
+            max_rad_per_s,
+        } => defmt::error!(
+            "scenario refused: dither frequency {=f64} rad/s: must be at most {=f64} rad/s, half the PWM rate",
+            frequency_rad_per_s,
+            max_rad_per_s
+        ),
         InvalidScenario::OverVoltage {
             motor_v,
             dither_v,

@@ -214,8 +214,9 @@ impl<T: Real> Injection<T> {
     }
 }
 
-/// Number of Gauss-Chebyshev nodes; a test holds the mean of the Magic Formula to 1e-6 of its peak with them.
-const NODES: usize = 16;
+/// Number of Gauss-Chebyshev nodes. They hold the mean of the Magic Formula of set A to 1e-6 of its peak up to an amplitude of
+/// 0.2 rad (the paper's largest is 0.19 rad), and to 2e-5 up to 0.3 rad.
+const NODES: usize = 32;
 
 /// Mean of a function over a sine, equation (23), by Gauss-Chebyshev quadrature.
 ///

@@ -1,5 +1,6 @@
 //! A scenario: every parameter of one run, the presets, and the check that they fit together.
 
+use crate::Real;
 use crate::dither::{Application, Dither, Waveform};
 use crate::friction::{Friction, FrictionLaw};
 use crate::parameter::{Field, OutOfRange, ParameterSet};
@@ -7,10 +8,13 @@ use crate::servo::Servo;
 use crate::steering::Steering;
 use crate::tire::{LOW_FRICTION_ROAD, MagicFormula, TireModel};
 use crate::vehicle::{SlipForm, Vehicle};
-use crate::Real;
 use core::fmt;
 
-/// Most model steps of a run; a counter of 32 bits holds the PWM samples of it with room to spare.
+/// One step, less what rounding to f32 can take from it.
+const ALMOST_ONE: f64 = 1.0 - 1e-6;
+/// Most PWM samples in a model step; a telemetry record holds them all.
+const MAX_RATIO: u32 = 1000;
+/// Most PWM samples of a run; a counter of 32 bits holds them.
 const MAX_SAMPLES: f64 = 4e9;
 
 /// The tyres of both axles.
@@ -265,7 +269,20 @@ impl<T: Real> Scenario<T> {
         self.servo.validate()?;
         self.run.validate()?;
         self.validate_rates()?;
+        self.validate_frequency()?;
         self.validate_voltage()
+    }
+
+    fn validate_frequency(&self) -> Result<(), InvalidScenario> {
+        let frequency_rad_per_s = self.dither.frequency_rad_per_s().to_f64();
+        let max_rad_per_s = core::f64::consts::PI * self.run.pwm_rate_hz.to_f64();
+        if frequency_rad_per_s <= max_rad_per_s {
+            return Ok(());
+        }
+        Err(InvalidScenario::DitherFrequency {
+            frequency_rad_per_s,
+            max_rad_per_s,
+        })
     }
 
     fn validate_rates(&self) -> Result<(), InvalidScenario> {
@@ -273,7 +290,7 @@ impl<T: Real> Scenario<T> {
         let (control_hz, pwm_hz) = (run.control_rate_hz.to_f64(), run.pwm_rate_hz.to_f64());
         let (control, pwm) = (run.control_rate_hz.to_u32(), run.pwm_rate_hz.to_u32());
         let whole = f64::from(control) == control_hz && f64::from(pwm) == pwm_hz;
-        if !whole || control == 0 || !pwm.is_multiple_of(control) {
+        if !whole || control == 0 || !pwm.is_multiple_of(control) || pwm / control > MAX_RATIO {
             return Err(InvalidScenario::Rates { control_hz, pwm_hz });
         }
         let counts = self.servo.period_counts(run.pwm_rate_hz);
@@ -281,7 +298,8 @@ impl<T: Real> Scenario<T> {
             return Err(InvalidScenario::TimerPeriod { counts });
         }
         let samples = run.duration_s.to_f64() * pwm_hz;
-        if self.steps() == 0 || samples > MAX_SAMPLES {
+        let steps = run.duration_s.to_f64() * self.model_rate_hz().to_f64();
+        if steps < ALMOST_ONE || samples > MAX_SAMPLES {
             return Err(InvalidScenario::Duration {
                 duration_s: run.duration_s.to_f64(),
                 min_s: 1.0 / self.model_rate_hz().to_f64(),
@@ -371,6 +389,13 @@ pub enum InvalidScenario {
         /// Greatest length, s.
         max_s: f64,
     },
+    /// The dither is faster than half the PWM rate, so its samples would show another frequency.
+    DitherFrequency {
+        /// Frequency asked for, rad/s.
+        frequency_rad_per_s: f64,
+        /// Greatest frequency at the PWM rate, rad/s.
+        max_rad_per_s: f64,
+    },
     /// Motor and dither together ask for more than the bus has.
     OverVoltage {
         /// Voltage of the motor current, V.
@@ -395,7 +420,7 @@ impl fmt::Display for InvalidScenario {
             Self::Rates { control_hz, pwm_hz } => write!(
                 f,
                 "run.pwm_rate_hz = {pwm_hz} and run.control_rate_hz = {control_hz}: both must be whole numbers, the first a \
-                 multiple of the second"
+                 multiple of the second, at most {MAX_RATIO} times it"
             ),
             Self::TimerPeriod { counts } => write!(
                 f,
@@ -409,6 +434,13 @@ impl fmt::Display for InvalidScenario {
             } => write!(
                 f,
                 "run.duration_s = {duration_s}: must be from {min_s} (one step) to {max_s}"
+            ),
+            Self::DitherFrequency {
+                frequency_rad_per_s,
+                max_rad_per_s,
+            } => write!(
+                f,
+                "dither frequency {frequency_rad_per_s} rad/s: must be at most {max_rad_per_s} rad/s, half of run.pwm_rate_hz"
             ),
             Self::OverVoltage {
                 motor_v,

@@ -35,8 +35,10 @@ impl Choice for SlipForm {
 }
 
 impl Choice for TireModel {
-    const ALL: &'static [(&'static str, Self)] =
-        &[("cubic", Self::Cubic), ("magic_formula", Self::MagicFormula)];
+    const ALL: &'static [(&'static str, Self)] = &[
+        ("cubic", Self::Cubic),
+        ("magic_formula", Self::MagicFormula),
+    ];
 }
 
 impl Choice for FrictionLaw {

@@ -205,7 +205,10 @@ impl<'a> Reader<'a> {
 
     fn take<const N: usize>(&mut self) -> [u8; N] {
         // The lengths are those of this module's constants, which a test holds to the fields.
-        let (taken, rest) = self.bytes.split_first_chunk().expect("frame is long enough");
+        let (taken, rest) = self
+            .bytes
+            .split_first_chunk()
+            .expect("frame is long enough");
         self.bytes = rest;
         *taken
     }

@@ -192,7 +192,8 @@ impl<T: Real> Tire<T> {
                 Injection::Off => tire.force(alpha),
                 Injection::Shift { offset } => tire.force(alpha + offset),
                 Injection::SquareMean { amplitude } => {
-                    T::from_f64(0.5) * (tire.force(alpha + amplitude) + tire.force(alpha - amplitude))
+                    T::from_f64(0.5)
+                        * (tire.force(alpha + amplitude) + tire.force(alpha - amplitude))
                 }
                 Injection::SineMean { amplitude } => mean.of(|a| tire.force(a), alpha, amplitude),
             },

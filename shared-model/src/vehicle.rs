@@ -306,12 +306,7 @@ impl<T: Real> Model<T> {
         }
     }
 
-    fn friction_torque_nm(
-        &self,
-        x: &Vector4<T>,
-        injection: Injection<T>,
-        mode: FrictionMode,
-    ) -> T {
+    fn friction_torque_nm(&self, x: &Vector4<T>, injection: Injection<T>, mode: FrictionMode) -> T {
         match mode {
             FrictionMode::Positive => self.friction_limit_nm,
             FrictionMode::Negative => -self.friction_limit_nm,

@@ -54,7 +54,8 @@ pub enum ConfigError {
 }
 
 fn suggest(near: &Option<String>) -> String {
-    near.as_ref().map_or_else(String::new, |near| format!("; did you mean {near}?"))
+    near.as_ref()
+        .map_or_else(String::new, |near| format!("; did you mean {near}?"))
 }
 
 fn names<C: Choice>() -> String {
@@ -161,7 +162,13 @@ fn choice(key: &str, value: String) -> Result<String, ConfigError> {
         "dither.application" => check::<Application>(&value),
         _ => unreachable!("{key} is no parameter with names"),
     };
-    known.map_err(|names| wrong_kind(key, &Value::String(value.clone()), &format!("one of {names}")))?;
+    known.map_err(|names| {
+        wrong_kind(
+            key,
+            &Value::String(value.clone()),
+            &format!("one of {names}"),
+        )
+    })?;
     Ok(value)
 }
 

@@ -92,7 +92,10 @@ pub struct OneStep {
 impl OneStep {
     /// The greatest defect over its bound.
     pub fn worst(&self) -> f64 {
-        self.ratios.iter().map(|&(_, ratio)| ratio).fold(0.0, nan_max)
+        self.ratios
+            .iter()
+            .map(|&(_, ratio)| ratio)
+            .fold(0.0, nan_max)
     }
 }
 
@@ -111,14 +114,19 @@ pub fn one_step(scenario: &Scenario<f64>, firmware: &Trace) -> Result<OneStep, I
     let mut ratios = Vec::with_capacity(firmware.states.len());
     let mut squares = 0.0;
     for (k, (start, end)) in firmware.starts().zip(&firmware.states).enumerate() {
-        ecu.control.set_state(start.map(|value| Rounded::exact(value as f32)));
+        ecu.control
+            .set_state(start.map(|value| Rounded::exact(value as f32)));
         let step = ecu.step(|_| {});
         let mut worst = 0.0;
-        for i in 0..4 {
-            let defect = (end.x[i] - step.x[i].value).abs();
-            let ratio = if defect == 0.0 { 0.0 } else { defect / step.x[i].error };
+        for ((end, step), size) in end.x.iter().zip(step.x.iter()).zip(sizes) {
+            let defect = (end - step.value).abs();
+            let ratio = if defect == 0.0 {
+                0.0
+            } else {
+                defect / step.error
+            };
             worst = nan_max(worst, ratio);
-            squares += (defect / sizes[i]).powi(2);
+            squares += (defect / size).powi(2);
         }
         ratios.push((firmware.time_s(k), worst));
     }
@@ -143,13 +151,36 @@ pub fn divergence(a: &Trace, b: &Trace) -> Vec<(f64, f64)> {
         let apart = (0..4).map(|i| (p.x[i] - q.x[i]).abs() / sizes[i]);
         (a.time_s(k), apart.fold(0.0, nan_max))
     };
-    a.states.iter().zip(&b.states).enumerate().map(distance).collect()
+    a.states
+        .iter()
+        .zip(&b.states)
+        .enumerate()
+        .map(distance)
+        .collect()
 }
 
-/// The time (s) at which runs part: the first distance above [`PARTED`].
-pub fn parted_at_s(divergence: &[(f64, f64)]) -> Option<f64> {
-    let parted = |&&(_, distance): &&(f64, f64)| distance.is_nan() || distance > PARTED;
-    divergence.iter().find(parted).map(|&(time_s, _)| time_s)
+/// The time (s) at which runs part: the first at which the geometric mean of their distance over a cycle of `cycle_s` is above
+/// [`PARTED`]. Within a cycle the distance swings by some e-folds, of which the exponent knows nothing.
+pub fn parted_at_s(divergence: &[(f64, f64)], cycle_s: f64) -> Option<f64> {
+    let step_s = divergence.first()?.0;
+    let cycle = (cycle_s / step_s).round().max(1.0) as usize;
+    // The least distance that counts: runs that are equal have none.
+    let logarithm = |&(_, distance): &(f64, f64)| distance.max(f64::MIN_POSITIVE).ln();
+    let limit = cycle as f64 * PARTED.ln();
+    let mut sum = 0.0;
+    for (k, point) in divergence.iter().enumerate() {
+        if point.1.is_nan() {
+            return Some(point.0);
+        }
+        sum += logarithm(point);
+        if k >= cycle {
+            sum -= logarithm(&divergence[k - cycle]);
+            if sum > limit {
+                return Some(point.0 - 0.5 * cycle_s);
+            }
+        }
+    }
+    None
 }
 
 /// When free f32 and f64 runs are expected to part: least, expected and greatest time, s.
@@ -179,7 +210,9 @@ pub fn bounds_distance(firmware: &Trace, from: usize, host: &Trace, host_from: u
     let gamma: Vec<f64> = host.component(YAW_RATE).skip(host_from).collect();
     let extremes = |pick: fn(f64, f64) -> f64, start: f64| -> Vec<f64> {
         let pieces = gamma.chunks_exact(length);
-        pieces.map(|piece| piece.iter().copied().fold(start, pick)).collect()
+        pieces
+            .map(|piece| piece.iter().copied().fold(start, pick))
+            .collect()
     };
     let (own_low, own_high) = firmware.range(YAW_RATE, from);
     let lows = distance(own_low, &extremes(f64::min, f64::INFINITY), high - low);
@@ -196,24 +229,39 @@ fn distance(value: f64, sample: &[f64], range: f64) -> f64 {
 
 /// Level 4: distance of the yaw rate's maxima as distributions (Kolmogorov and Smirnov's two-sample statistic), and its
 /// critical value at a level of 0.1 %. For chaotic motions, whose maxima hardly depend on each other.
-pub fn poincare_distance(firmware: &Trace, from: usize, host: &Trace, host_from: usize) -> (f64, f64) {
+pub fn poincare_distance(
+    firmware: &Trace,
+    from: usize,
+    host: &Trace,
+    host_from: usize,
+) -> (f64, f64) {
     let heights = |trace, from| {
-        let mut heights: Vec<f64> = yaw_rate_maxima(trace, from).iter().map(|&(_, h)| h).collect();
+        let mut heights: Vec<f64> = yaw_rate_maxima(trace, from)
+            .iter()
+            .map(|&(_, h)| h)
+            .collect();
         heights.sort_by(f64::total_cmp);
         heights
     };
     let (a, b) = (heights(firmware, from), heights(host, host_from));
-    let below = |sample: &[f64], x: f64| {
-        sample.partition_point(|&h| h <= x) as f64 / sample.len() as f64
-    };
-    let apart = a.iter().chain(&b).map(|&x| (below(&a, x) - below(&b, x)).abs());
+    let below =
+        |sample: &[f64], x: f64| sample.partition_point(|&h| h <= x) as f64 / sample.len() as f64;
+    let apart = a
+        .iter()
+        .chain(&b)
+        .map(|&x| (below(&a, x) - below(&b, x)).abs());
     let (n, m) = (a.len() as f64, b.len() as f64);
     (apart.fold(0.0, nan_max), 1.949 * ((n + m) / (n * m)).sqrt())
 }
 
 /// Level 4: the furthest that a maximum of the firmware's yaw rate is from the nearest of the host's, over the yaw rate's
 /// range. For periodic motions, whose maxima are a few points.
-pub fn poincare_points_distance(firmware: &Trace, from: usize, host: &Trace, host_from: usize) -> f64 {
+pub fn poincare_points_distance(
+    firmware: &Trace,
+    from: usize,
+    host: &Trace,
+    host_from: usize,
+) -> f64 {
     let (low, high) = host.range(YAW_RATE, host_from);
     let host = yaw_rate_maxima(host, host_from);
     let nearest = |height: f64| {
@@ -221,5 +269,8 @@ pub fn poincare_points_distance(firmware: &Trace, from: usize, host: &Trace, hos
         apart.fold(f64::INFINITY, f64::min)
     };
     let own = yaw_rate_maxima(firmware, from);
-    own.iter().map(|&(_, height)| nearest(height)).fold(0.0, nan_max) / (high - low)
+    own.iter()
+        .map(|&(_, height)| nearest(height))
+        .fold(0.0, nan_max)
+        / (high - low)
 }

@@ -56,7 +56,9 @@ impl Trace {
         let empty = (f64::INFINITY, f64::NEG_INFINITY);
         self.component(index)
             .skip(from)
-            .fold(empty, |(low, high), value| (low.min(value), high.max(value)))
+            .fold(empty, |(low, high), value| {
+                (low.min(value), high.max(value))
+            })
     }
 
     /// Time at which the motion leaves all physical bounds, if it does, s.

@@ -35,13 +35,35 @@ pub struct Check {
 
 impl Check {
     /// A check that the figure is at most `limit`. NaN fails.
-    pub fn at_most(id: impl Into<String>, title: impl Into<String>, measured: f64, limit: f64) -> Self {
-        Self::new(id, title, measured, format!("<= {}", figure(limit)), measured <= limit)
+    pub fn at_most(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        measured: f64,
+        limit: f64,
+    ) -> Self {
+        Self::new(
+            id,
+            title,
+            measured,
+            format!("<= {}", figure(limit)),
+            measured <= limit,
+        )
     }
 
     /// A check that the figure is at least `limit`. NaN fails.
-    pub fn at_least(id: impl Into<String>, title: impl Into<String>, measured: f64, limit: f64) -> Self {
-        Self::new(id, title, measured, format!(">= {}", figure(limit)), measured >= limit)
+    pub fn at_least(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        measured: f64,
+        limit: f64,
+    ) -> Self {
+        Self::new(
+            id,
+            title,
+            measured,
+            format!(">= {}", figure(limit)),
+            measured >= limit,
+        )
     }
 
     /// A check that the figure lies from `low` to `high`. NaN fails.
@@ -52,18 +74,33 @@ impl Check {
         (low, high): (f64, f64),
     ) -> Self {
         let limit = format!("{} to {}", figure(low), figure(high));
-        Self::new(id, title, measured, limit, low <= measured && measured <= high)
+        Self::new(
+            id,
+            title,
+            measured,
+            limit,
+            low <= measured && measured <= high,
+        )
     }
 
     /// A check that the figure equals `expected`.
-    pub fn equals(id: impl Into<String>, title: impl Into<String>, measured: f64, expected: f64) -> Self {
+    pub fn equals(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        measured: f64,
+        expected: f64,
+    ) -> Self {
         let limit = format!("= {}", figure(expected));
         #[expect(clippy::float_cmp, reason = "counts and other exact figures")]
         Self::new(id, title, measured, limit, measured == expected)
     }
 
     /// A check that could not be made.
-    pub fn untested(id: impl Into<String>, title: impl Into<String>, reason: impl Into<String>) -> Self {
+    pub fn untested(
+        id: impl Into<String>,
+        title: impl Into<String>,
+        reason: impl Into<String>,
+    ) -> Self {
         Self {
             id: id.into(),
             title: title.into(),
@@ -88,7 +125,11 @@ impl Check {
             measured: Some(measured),
             limit,
             unit: String::new(),
-            status: if passed { Status::Passed } else { Status::Failed },
+            status: if passed {
+                Status::Passed
+            } else {
+                Status::Failed
+            },
             detail: String::new(),
         }
     }
@@ -151,6 +192,9 @@ impl Verdict {
 
     /// Number of checks with the given status.
     pub fn count(&self, status: Status) -> usize {
-        self.checks.iter().filter(|check| check.status == status).count()
+        self.checks
+            .iter()
+            .filter(|check| check.status == status)
+            .count()
     }
 }

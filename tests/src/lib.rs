@@ -1,10 +1,10 @@
 //! Runs of the firmware's images in QEMU, for the tests.
 
+use shared_model::Scenario;
 use sim_host::pil::elf::Image;
 use sim_host::pil::qemu::{self, Finished, Machine, RunError};
 use sim_host::pil::settings;
 use sim_host::pil::telemetry::Recording;
-use shared_model::Scenario;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -18,8 +18,11 @@ pub const TELEMETRY: &str = "telemetry.bin";
 /// # Panics
 /// If it is not built: a test that cannot run has not passed.
 pub fn image(name: &str) -> Image {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are in the workspace");
-    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("the tests are in the workspace");
+    let target =
+        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
     let path = target.join("thumbv7em-none-eabihf/firmware").join(name);
     Image::open(&path).unwrap_or_else(|error| panic!("{error} (or run `cargo xtask test`)"))
 }

@@ -28,6 +28,9 @@ pub struct Exponent {
     pub per_s: f64,
     /// Standard error, 1/s; see [`largest`].
     pub standard_error_per_s: f64,
+    /// The least rate that the motion's length can tell from zero, 1/s: the most that the vector stretches beyond the mean
+    /// within one cycle, and at least one e-fold, over the whole length.
+    pub resolution_per_s: f64,
     /// Length of the motion that it is taken over, s.
     pub duration_s: f64,
 }
@@ -44,32 +47,34 @@ impl Exponent {
         Self {
             per_s: mean,
             standard_error_per_s: long_run_variance_sum(&excess).sqrt() / duration_s,
+            resolution_per_s: excess.iter().fold(1.0, |most: f64, e| most.max(e.abs()))
+                / duration_s,
             duration_s,
         }
     }
 
-    /// The least rate that the motion's length can tell from zero: one e-fold over all of it.
-    pub fn resolution_per_s(&self) -> f64 {
-        1.0 / self.duration_s
+    /// What the exponent must exceed to count as positive: three standard errors, and the resolution.
+    pub fn threshold_per_s(&self) -> f64 {
+        (3.0 * self.standard_error_per_s).max(self.resolution_per_s)
     }
 
-    /// Above zero by three standard errors and by its resolution: the motion is chaotic.
+    /// Above the threshold: the motion is chaotic.
     pub fn is_positive(&self) -> bool {
-        self.per_s > (3.0 * self.standard_error_per_s).max(self.resolution_per_s())
+        self.per_s > self.threshold_per_s()
     }
 }
 
 /// Variance of the sum of a correlated sequence of mean zero: prewhitened by a first-order autoregression, then with
 /// Bartlett weights over as many lags as the root of the length. D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953.
 fn long_run_variance_sum(sequence: &[f64]) -> f64 {
-    let covariance = |x: &[f64], lag: usize| -> f64 {
-        x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum()
-    };
+    let covariance =
+        |x: &[f64], lag: usize| -> f64 { x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum() };
     let variance = covariance(sequence, 0);
     if variance == 0.0 {
         return 0.0;
     }
-    let rho = (covariance(sequence, 1) / variance).clamp(-GREATEST_CORRELATION, GREATEST_CORRELATION);
+    let rho =
+        (covariance(sequence, 1) / variance).clamp(-GREATEST_CORRELATION, GREATEST_CORRELATION);
     let white: Vec<f64> = sequence.windows(2).map(|x| x[1] - rho * x[0]).collect();
     let lags = (white.len() as f64).sqrt() as usize;
     let weighted = (1..=lags).map(|lag| {

@@ -58,9 +58,9 @@ impl std::fmt::Display for Period {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Equilibrium => f.write_str("equilibrium"),
-            Self::Periodic {
-                maxima, time_s, ..
-            } => write!(f, "period-{maxima} (cycle {time_s:.4} s)"),
+            Self::Periodic { maxima, time_s, .. } => {
+                write!(f, "period-{maxima} (cycle {time_s:.4} s)")
+            }
             Self::Aperiodic { .. } => write!(f, "no period up to {MAX_PERIOD}"),
             Self::TooShort { maxima } => write!(f, "too short: {maxima} maxima"),
         }
@@ -81,6 +81,13 @@ pub fn yaw_rate_maxima(trace: &Trace, from: usize) -> Vec<(f64, f64)> {
     };
     let peaks = prominent_maxima(&gamma, PROMINENCE * (high - low));
     peaks.into_iter().map(interpolate).collect()
+}
+
+/// Mean time between maxima of the yaw rate, s, if there are two.
+pub fn mean_cycle_s(trace: &Trace) -> Option<f64> {
+    let maxima = yaw_rate_maxima(trace, 0);
+    let (first, last) = (maxima.first()?.0, maxima.last()?.0);
+    (maxima.len() > 1).then(|| (last - first) / (maxima.len() - 1) as f64)
 }
 
 /// Indices of the maxima to which `values` rise by at least `prominence`, and from which they fall by as much.
@@ -143,7 +150,11 @@ fn residual(maxima: &[(f64, f64)], n: usize) -> f64 {
 }
 
 fn cycle_time(maxima: &[(f64, f64)], n: usize) -> (f64, f64) {
-    let times: Vec<f64> = maxima.iter().zip(&maxima[n..]).map(|(a, b)| b.0 - a.0).collect();
+    let times: Vec<f64> = maxima
+        .iter()
+        .zip(&maxima[n..])
+        .map(|(a, b)| b.0 - a.0)
+        .collect();
     let mean = times.iter().sum::<f64>() / times.len() as f64;
     let spread = times.iter().map(|t| (t - mean).abs()).fold(0.0, f64::max);
     (mean, spread)

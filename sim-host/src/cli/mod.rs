@@ -134,7 +134,12 @@ impl RunOptions {
 }
 
 fn waveform(name: &str) -> Result<Waveform, String> {
-    let names = || Waveform::ALL.iter().map(|&(name, _)| name).collect::<Vec<_>>();
+    let names = || {
+        Waveform::ALL
+            .iter()
+            .map(|&(name, _)| name)
+            .collect::<Vec<_>>()
+    };
     Waveform::from_name(name).ok_or_else(|| format!("must be one of {}", names().join(", ")))
 }
 

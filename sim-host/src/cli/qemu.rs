@@ -8,14 +8,16 @@ use std::path::{Path, PathBuf};
 
 /// Run a firmware image in QEMU: show its log, pass its exit code on, and end with it.
 #[derive(clap::Args)]
-#[command(after_help = "Examples (cargo runs this from firmware/, so `cargo run -- SETTINGS` is the short form):
+#[command(
+    after_help = "Examples (cargo runs this from firmware/, so `cargo run -- SETTINGS` is the short form):
   sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu run.wheel_speed_rpm=1600
   sim-host qemu ecu dither.waveform=sine dither.amplitude_v=1 telemetry=run.bin
   sim-host qemu --machine mps2-an500 --time-out 60 ecu run.duration_s=5
 
 Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME and telemetry=FILE.
 Exit codes are the firmware's: 0 complete, 10 scenario refused, 11 telemetry, 12 overrun, 13 panic, 14 hard fault, 15
-watchdog, 16 unexpected interrupt; 2 if it could not be run or did not end in time.")]
+watchdog, 16 unexpected interrupt; 2 if it could not be run or did not end in time."
+)]
 pub struct Arguments {
     /// Machine to emulate
     #[arg(long, value_enum, default_value = "mps2-an386")]
@@ -33,7 +35,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let time_out = super::time_out(arguments.time_out)?;
     let image = Image::open(&arguments.image)?;
-    if let Some(setting) = arguments.settings.iter().find(|s| s.contains(char::is_whitespace)) {
+    if let Some(setting) = arguments
+        .settings
+        .iter()
+        .find(|s| s.contains(char::is_whitespace))
+    {
         bail!("setting {setting:?}: the firmware takes no blanks in a setting");
     }
     let show = |line: &str| println!("{line}");
@@ -47,8 +53,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     )?;
     let code = finished.exit_code;
     if code != 0 {
-        eprintln!("firmware ended with exit code {code}: {}", qemu::meaning(code));
+        eprintln!(
+            "firmware ended with exit code {code}: {}",
+            qemu::meaning(code)
+        );
     }
-    Ok(Done::Code(u8::try_from(code).unwrap_or(super::COULD_NOT_RUN)))
+    Ok(Done::Code(
+        u8::try_from(code).unwrap_or(super::COULD_NOT_RUN),
+    ))
 }
-

@@ -36,7 +36,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         simulate(&scenario)?
     };
     if let Some(time_s) = trace.diverges_at_s() {
-        bail!("the motion diverges at {time_s} s; nothing was written. Set B of Table 1 with the cubic tyre and a negative peak_n do so");
+        bail!(
+            "the motion diverges at {time_s} s; nothing was written. Set B of Table 1 with the cubic tyre and a negative peak_n do so"
+        );
     }
     write(&trace, &arguments.out, arguments.force)?;
     println!(

@@ -23,7 +23,9 @@ pub struct Image {
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file cannot be read.
-    #[error("cannot read the firmware image {path}: {source}; build it with `cargo xtask firmware`")]
+    #[error(
+        "cannot read the firmware image {path}: {source}; build it with `cargo xtask firmware`"
+    )]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -31,7 +33,9 @@ pub enum ImageError {
         source: std::io::Error,
     },
     /// It is no ELF file.
-    #[error("{path} is not an ELF file: {reason}; give the firmware's ELF, which `cargo xtask firmware` builds")]
+    #[error(
+        "{path} is not an ELF file: {reason}; give the firmware's ELF, which `cargo xtask firmware` builds"
+    )]
     NotElf {
         /// The file.
         path: PathBuf,
@@ -39,7 +43,9 @@ pub enum ImageError {
         reason: String,
     },
     /// It is for another machine.
-    #[error("{path} is an image for {found}, not for a 32-bit Arm Cortex-M; build it with `cargo xtask firmware`")]
+    #[error(
+        "{path} is an image for {found}, not for a 32-bit Arm Cortex-M; build it with `cargo xtask firmware`"
+    )]
     OtherMachine {
         /// The file.
         path: PathBuf,

@@ -51,7 +51,9 @@ impl Machine {
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The emulator is not there.
-    #[error("{PROGRAM} is not installed; run `cargo xtask setup`, or install QEMU for Arm (Debian: apt-get install qemu-system-arm)")]
+    #[error(
+        "{PROGRAM} is not installed; run `cargo xtask setup`, or install QEMU for Arm (Debian: apt-get install qemu-system-arm)"
+    )]
     NoEmulator,
     /// The emulator cannot be started.
     #[error("cannot start {PROGRAM}: {0}")]

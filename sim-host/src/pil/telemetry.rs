@@ -86,7 +86,8 @@ impl Recording {
         let header = Header::decode(bytes).map_err(|error| damaged(0, "header", error))?;
         let length = record_len(header.samples_per_step);
         let mut records = Vec::with_capacity(bytes.len() / length);
-        let mut duties = Vec::with_capacity(records.capacity() * usize::from(header.samples_per_step));
+        let mut duties =
+            Vec::with_capacity(records.capacity() * usize::from(header.samples_per_step));
         let mut offset = HEADER_LEN;
         while !is_trailer(&bytes[offset..]) {
             let last = records.last().map_or(0, |record: &Record| record.index);
@@ -100,8 +101,8 @@ impl Recording {
             records.push(record);
             offset += length;
         }
-        let trailer = Trailer::decode(&bytes[offset..])
-            .map_err(|error| damaged(offset, "trailer", error))?;
+        let trailer =
+            Trailer::decode(&bytes[offset..]).map_err(|error| damaged(offset, "trailer", error))?;
         let excess = bytes.len() - offset - TRAILER_LEN;
         if excess > 0 {
             return Err(TelemetryError::Excess { bytes: excess });
@@ -124,7 +125,10 @@ impl Recording {
     /// The motion that was recorded.
     pub fn trace(&self) -> Trace {
         let samples_per_step = usize::from(self.header.samples_per_step);
-        let states = self.records.iter().map(|record| record.state.map(Real::to_f64));
+        let states = self
+            .records
+            .iter()
+            .map(|record| record.state.map(Real::to_f64));
         Trace {
             step_s: 1.0 / f64::from(self.header.step_rate_hz),
             initial: self.header.initial.map(Real::to_f64),

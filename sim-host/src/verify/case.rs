@@ -10,10 +10,10 @@ use crate::pil::telemetry::Recording;
 use crate::report::RunReport;
 use crate::simulate::{settle, simulate, started_at};
 use crate::trace::Trace;
+use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::servo::Pwm;
 use shared_model::telemetry::record_len;
-use shared_model::Scenario;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -106,7 +106,13 @@ pub(super) fn all(options: &Options) -> Vec<Case> {
         title: "1750 rpm, sine 1.0 V, Cortex-M7".into(),
         role: Role::SecondCore,
         machine: Machine::Mps2An500,
-        scenario: scenario(options, 1750.0, Sine, Application::Averaged, SECOND_CORE_RUN_S),
+        scenario: scenario(
+            options,
+            1750.0,
+            Sine,
+            Application::Averaged,
+            SECOND_CORE_RUN_S,
+        ),
         expected: Expected::Period(1),
     };
     let dithered = |waveform, application, role| {
@@ -195,7 +201,9 @@ pub(super) fn run(
         Role::Signal(_) => RIPPLE_TOLERANCE,
         _ => TOLERANCE,
     };
-    let analysis = all_levels.then(|| analyse(&case.scenario, &firmware)).transpose()?;
+    let analysis = all_levels
+        .then(|| analyse(&case.scenario, &firmware))
+        .transpose()?;
     Ok(Outcome {
         bits: equivalence::bits(&firmware, &host),
         period: period(&firmware, settled, tolerance),
@@ -275,8 +283,8 @@ fn report_progress(
     finished: &AtomicBool,
     on_progress: &(impl Fn(Progress) + Sync),
 ) {
-    let a_second = f64::from(scenario.model_rate_hz())
-        * record_len(scenario.samples_per_step() as u16) as f64;
+    let a_second =
+        f64::from(scenario.model_rate_hz()) * record_len(scenario.samples_per_step() as u16) as f64;
     let mut told = 0.0;
     loop {
         let done = finished.load(Ordering::Relaxed);
@@ -314,7 +322,12 @@ impl Outcome {
         let dithered = scenario.dither.waveform != Waveform::None;
         let (one_step_defect, divergence) = self.analysis.as_ref().map_or_else(
             || (Vec::new(), Vec::new()),
-            |analysis| (analysis.one_step.ratios.clone(), analysis.divergence.clone()),
+            |analysis| {
+                (
+                    analysis.one_step.ratios.clone(),
+                    analysis.divergence.clone(),
+                )
+            },
         );
         let horizon_s = self.horizon_s();
         RunReport {

@@ -1,6 +1,7 @@
 //! The checks of a verification: the four levels of equivalence, and what the firmware needs.
 
 use super::case::{Analysis, DITHER_TRANSIENT_S, Expected, Outcome, Role};
+use crate::chaos::period::mean_cycle_s;
 use crate::equivalence;
 use crate::pil::elf::Image;
 use crate::verdict::{Check, figure};
@@ -35,7 +36,10 @@ fn bits(outcome: &Outcome) -> Check {
     let bits = &outcome.bits;
     let title = "Bits: words that differ, host f32 and firmware";
     let seconds = outcome.firmware.states.len() as f64 * outcome.firmware.step_s;
-    let first = bits.first.as_ref().map_or(String::new(), |first| format!("; first: {first}"));
+    let first = bits
+        .first
+        .as_ref()
+        .map_or(String::new(), |first| format!("; first: {first}"));
     Check::equals(id("bits", outcome), title, bits.differing as f64, 0.0).detail(format!(
         "{} state words, friction modes and duty codes over {seconds} s on the {}{first}",
         bits.compared,
@@ -45,8 +49,13 @@ fn bits(outcome: &Outcome) -> Check {
 
 fn overruns(outcome: &Outcome) -> Check {
     let overruns = f64::from(outcome.recording.trailer.overruns);
-    Check::equals(id("overruns", outcome), "Records lost, tasks late", overruns, 0.0)
-        .detail(outcome.log.last().cloned().unwrap_or_default())
+    Check::equals(
+        id("overruns", outcome),
+        "Records lost, tasks late",
+        overruns,
+        0.0,
+    )
+    .detail(outcome.log.last().cloned().unwrap_or_default())
 }
 
 fn one_step(outcome: &Outcome, analysis: &Analysis) -> Check {
@@ -59,9 +68,14 @@ fn one_step(outcome: &Outcome, analysis: &Analysis) -> Check {
 }
 
 fn horizon(outcome: &Outcome, analysis: &Analysis) -> Check {
-    let parted = equivalence::parted_at_s(&analysis.divergence);
+    let cycle_s = mean_cycle_s(&outcome.firmware).unwrap_or(outcome.firmware.step_s);
+    let parted = equivalence::parted_at_s(&analysis.divergence, cycle_s);
     let Some(predicted @ [least, expected, greatest]) = outcome.horizon_s() else {
-        let furthest = analysis.divergence.iter().map(|&(_, d)| d).fold(0.0, f64::max);
+        let furthest = analysis
+            .divergence
+            .iter()
+            .map(|&(_, d)| d)
+            .fold(0.0, f64::max);
         let title = "Horizon: greatest distance of free f32 and f64 runs over the attractor's size";
         return Check::at_most(id("horizon", outcome), title, furthest, NEVER_PART)
             .detail("a periodic motion: the runs must never part");
@@ -106,8 +120,7 @@ fn invariants(outcome: &Outcome, analysis: &Analysis) -> Vec<Check> {
         let title = "Invariants: furthest yaw-rate maximum from the host's, over the range";
         Check::at_most(id("poincare", outcome), title, distance, NEVER_PART)
     } else {
-        let (distance, critical) =
-            equivalence::poincare_distance(firmware, from, long, long_from);
+        let (distance, critical) = equivalence::poincare_distance(firmware, from, long, long_from);
         let title = "Invariants: distance of the yaw-rate maxima's distributions";
         Check::at_most(id("poincare", outcome), title, distance, critical)
             .detail("Kolmogorov-Smirnov; limit at a level of 0.1 %")
@@ -116,8 +129,9 @@ fn invariants(outcome: &Outcome, analysis: &Analysis) -> Vec<Check> {
     let firmware_period = outcome.period.maxima().unwrap_or(0) as f64;
     let host_period = analysis.long_period.maxima().unwrap_or(0) as f64;
     let title = "Invariants: period, firmware as host (0: none)";
-    let period = Check::equals(id("period", outcome), title, firmware_period, host_period)
-        .detail(format!("firmware {}, host {}", outcome.period, analysis.long_period));
+    let period = Check::equals(id("period", outcome), title, firmware_period, host_period).detail(
+        format!("firmware {}, host {}", outcome.period, analysis.long_period),
+    );
     vec![exponent(outcome, analysis), period, bounds, poincare]
 }
 
@@ -130,7 +144,7 @@ fn exponent(outcome: &Outcome, analysis: &Analysis) -> Check {
     let error = own
         .standard_error_per_s
         .hypot(host.standard_error_per_s)
-        .max(own.resolution_per_s() / 3.0);
+        .max(own.resolution_per_s / 3.0);
     let distance = (own.per_s - host.per_s).abs() / error;
     Check::at_most(id("exponent", outcome), title, distance, 3.0)
         .detail(format!("firmware {own}, host {host}"))
@@ -156,18 +170,20 @@ pub(super) fn chaotic(outcome: &Outcome) -> Check {
         let reason = "the run is too short for a standard error; make it longer";
         return Check::untested(id("chaos", outcome), title, reason);
     };
-    let limit = (3.0 * exponent.standard_error_per_s).max(exponent.resolution_per_s());
-    Check::at_least(id("chaos", outcome), title, exponent.per_s, limit)
+    Check::at_least(id("chaos", outcome), title, exponent.per_s, exponent.threshold_per_s())
         .unit("1/s")
         .detail(format!(
-            "{exponent}; limit: three standard errors, and one e-fold over the run; {}",
+            "{exponent}; limit: three standard errors, and the growth within one cycle over the run; {}",
             outcome.period
         ))
 }
 
 /// What the firmware needs of the machine.
 pub(super) fn resources(image: &Image, outcomes: &[Outcome]) -> Vec<Check> {
-    let stack = outcomes.iter().map(|outcome| outcome.recording.trailer.stack_bytes).max();
+    let stack = outcomes
+        .iter()
+        .map(|outcome| outcome.recording.trailer.stack_bytes)
+        .max();
     let mut checks: Vec<Check> = outcomes.iter().map(load).collect();
     checks.push(
         Check::at_most(
@@ -241,7 +257,10 @@ pub(super) fn notes(image: &Image, outcomes: &[Outcome]) -> Vec<(String, String)
         .iter()
         .map(|outcome| outcome.firmware.states.len() as f64 * outcome.firmware.step_s)
         .sum();
-    let stack = outcomes.iter().map(|outcome| outcome.recording.trailer.stack_bytes).max();
+    let stack = outcomes
+        .iter()
+        .map(|outcome| outcome.recording.trailer.stack_bytes)
+        .max();
     vec![
         (
             "Simulated on the target".into(),

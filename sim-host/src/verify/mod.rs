@@ -50,7 +50,9 @@ pub enum VerifyError {
         source: RunError,
     },
     /// The firmware ended with an exit code that leaves nothing to compare.
-    #[error("{title}: the firmware ended with exit code {exit_code}: {meaning}; its last log line: {last_line}")]
+    #[error(
+        "{title}: the firmware ended with exit code {exit_code}: {meaning}; its last log line: {last_line}"
+    )]
     Firmware {
         /// The run.
         title: String,

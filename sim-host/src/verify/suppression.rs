@@ -55,13 +55,12 @@ pub(super) fn pairs(outcomes: &[Outcome]) -> Vec<Pair> {
 
 fn host_chaotic(before: &Outcome) -> Option<Check> {
     let exponent = before.analysis.as_ref()?.long_exponent?;
-    let limit = (3.0 * exponent.standard_error_per_s).max(exponent.resolution_per_s());
     Some(
         Check::at_least(
             format!("chaos-host/{}", before.case.id),
             "Chaos: largest Lyapunov exponent on the host, f64",
             exponent.per_s,
-            limit,
+            exponent.threshold_per_s(),
         )
         .unit("1/s")
         .detail(exponent.to_string()),
@@ -88,7 +87,12 @@ fn suppressed(after: &Outcome) -> Vec<Check> {
         return Vec::new();
     };
     let firmware = ("firmware", "", &after.period, after.exponent);
-    let host = ("host, f64", "-host", &analysis.long_period, analysis.long_exponent);
+    let host = (
+        "host, f64",
+        "-host",
+        &analysis.long_period,
+        analysis.long_exponent,
+    );
     [firmware, host]
         .into_iter()
         .flat_map(|(place, suffix, period, exponent)| {
@@ -114,12 +118,17 @@ fn not_chaotic(after: &Outcome, place: &str, suffix: &str, exponent: Option<Expo
     let id = format!("suppressed-exponent{suffix}/{}", after.case.id);
     let title = format!("After: largest Lyapunov exponent on the {place}");
     let Some(exponent) = exponent else {
-        return Check::untested(id, title, "the run is too short for a standard error; make it longer");
+        return Check::untested(
+            id,
+            title,
+            "the run is too short for a standard error; make it longer",
+        );
     };
-    let limit = (3.0 * exponent.standard_error_per_s).max(exponent.resolution_per_s());
-    Check::at_most(id, title, exponent.per_s, limit)
+    Check::at_most(id, title, exponent.per_s, exponent.threshold_per_s())
         .unit("1/s")
-        .detail(format!("{exponent}; zero is a periodic motion's; limit: what the run's length tells from zero"))
+        .detail(format!(
+            "{exponent}; zero is a periodic motion's; limit: what the run's length tells from zero"
+        ))
 }
 
 /// The motion under the true signal against that of the averaged system.
@@ -134,7 +143,14 @@ fn averaging(averaged: &Outcome, signal: &Outcome) -> Vec<Check> {
     .detail(signal.period.to_string());
     let (Some(averaged_s), Some(signal_s)) = (cycle_s(averaged), cycle_s(signal)) else {
         let reason = "one of the motions has no cycle";
-        return vec![period, Check::untested(id("averaging"), "Averaging: difference of the cycles", reason)];
+        return vec![
+            period,
+            Check::untested(
+                id("averaging"),
+                "Averaging: difference of the cycles",
+                reason,
+            ),
+        ];
     };
     let frequency = signal.case.scenario.dither.frequency_rad_per_s();
     let limit = 100.0 * AVERAGING_ORDER * TAU / signal_s / frequency;
@@ -157,7 +173,11 @@ fn averaging(averaged: &Outcome, signal: &Outcome) -> Vec<Check> {
         limit,
     )
     .unit("%")
-    .detail(format!("{:.5} rad/s from {:.5} rad/s", swing(signal), swing(averaged)));
+    .detail(format!(
+        "{:.5} rad/s from {:.5} rad/s",
+        swing(signal),
+        swing(averaged)
+    ));
     vec![period, cycle, swing]
 }
 

@@ -1,0 +1,350 @@
+//! The command line as a user meets it: bad input gets a clear message with the value and its bounds, exit code 2, and nothing
+//! is lost or overwritten.
+
+use shared_model::friction::FrictionMode;
+use shared_model::telemetry::{Header, Record, Trailer};
+use shared_model::vehicle::State;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const SIM_HOST: &str = env!("CARGO_BIN_EXE_sim-host");
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a temporary folder can be made")
+}
+
+fn sim_host(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(SIM_HOST)
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .expect("the program starts")
+}
+
+/// Runs in `folder`, expects exit code 2 and a last line with all of `parts`.
+fn assert_refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
+    let output = sim_host(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+    for part in parts {
+        assert!(
+            message.contains(part),
+            "{arguments:?}: {message} lacks {part:?}"
+        );
+    }
+}
+
+/// As [`assert_refused`], for a configuration file with the given text.
+fn assert_config_refused(toml: &str, parts: &[&str]) {
+    let folder = folder();
+    fs::write(folder.path().join("c.toml"), toml).expect("the file can be written");
+    let arguments = ["simulate", "--config", "c.toml", "--out", "t.csv"];
+    assert_refused(folder.path(), &arguments, parts);
+    assert!(!folder.path().join("t.csv").exists(), "nothing is written");
+}
+
+#[test]
+fn configuration_files_are_checked() {
+    assert_config_refused(
+        "[vehicle]\nmas_kg = 1",
+        &[
+            "unknown key vehicle.mas_kg",
+            "did you mean vehicle.mass_kg?",
+        ],
+    );
+    assert_config_refused("[engine]\npower = 1", &["unknown key engine"]);
+    assert_config_refused(
+        "[vehicle]\nmass_kg = nan",
+        &["vehicle.mass_kg = NaN", "from 1 to 100000"],
+    );
+    assert_config_refused(
+        "[vehicle]\nmass_kg = -1500",
+        &["vehicle.mass_kg = -1500", "from 1 to 100000"],
+    );
+    assert_config_refused(
+        "[vehicle]\nmass_kg = \"heavy\"",
+        &["vehicle.mass_kg", "heavy", "must be a number"],
+    );
+    assert_config_refused(
+        "[run]\nwheel_speed_rpm = 0",
+        &["run.wheel_speed_rpm = 0", "from 1"],
+    );
+    assert_config_refused(
+        "[run]\ncontrol_rate_hz = 0",
+        &["run.control_rate_hz = 0", "from 10"],
+    );
+    assert_config_refused(
+        "[run]\ncontrol_rate_hz = -1000",
+        &["run.control_rate_hz = -1000"],
+    );
+    assert_config_refused("[run]\npwm_rate_hz = inf", &["run.pwm_rate_hz = inf"]);
+    assert_config_refused("[run]\ncontrol_rate_hz = 3000", &["multiple"]);
+    assert_config_refused(
+        "[friction]\nlaw = \"sticky\"",
+        &["friction.law", "sticky", "coulomb_rate"],
+    );
+    assert_config_refused(
+        "[friction]\ndithered = 1",
+        &["friction.dithered = 1", "true or false"],
+    );
+    assert_config_refused(
+        "preset = \"papre\"",
+        &["unknown preset \"papre\"", "reconstruction, printed"],
+    );
+    assert_config_refused("preset = 3", &["preset = 3", "must be a name"]);
+    assert_config_refused("[vehicle\n", &["not TOML", "line 1"]);
+    assert_config_refused("vehicle = 3", &["vehicle = 3", "must be a table"]);
+}
+
+#[test]
+fn options_are_checked() {
+    let folder = folder();
+    let cases: [(&[&str], &[&str]); 8] = [
+        (&["--rpm", "0"], &["run.wheel_speed_rpm = 0"]),
+        (&["--rpm", "NaN"], &["run.wheel_speed_rpm = NaN"]),
+        (&["--time", "0"], &["run.duration_s = 0", "from 0.0001"]),
+        (&["--time", "-3"], &["run.duration_s = -3"]),
+        (
+            &["--dither", "square", "--amplitude-v", "13"],
+            &["amplitude_v = 13", "bus_voltage_v = 12", "at most 9 V"],
+        ),
+        (
+            &["--dither", "sine", "--amplitude-v", "-1"],
+            &["dither.amplitude_v = -1", "from 0"],
+        ),
+        (
+            &["--dither", "triangle"],
+            &["triangle", "none, square, sine"],
+        ),
+        (&["--preset", "papre"], &["unknown preset \"papre\""]),
+    ];
+    for (options, parts) in cases {
+        let mut arguments = vec!["simulate", "--out", "t.csv"];
+        arguments.extend(options);
+        assert_refused(folder.path(), &arguments, parts);
+        assert!(!folder.path().join("t.csv").exists(), "nothing is written");
+    }
+    assert_refused(
+        folder.path(),
+        &["simulate", "--config", "none.toml", "--out", "t.csv"],
+        &["none.toml"],
+    );
+}
+
+#[test]
+fn a_diverging_motion_is_said_and_not_written() {
+    let folder = folder();
+    let road_b = "[tires.front]\nstiffness_per_rad = 6.7651\nshape = 1.3\npeak_n = 6436.8\n\
+                  [tires.rear]\nstiffness_per_rad = 9.0051\nshape = 1.3\npeak_n = 5430.0\n";
+    fs::write(folder.path().join("b.toml"), road_b).expect("the file can be written");
+    let arguments = ["simulate", "--config", "b.toml", "--out", "t.csv"];
+    assert_refused(folder.path(), &arguments, &["diverges at"]);
+    assert!(!folder.path().join("t.csv").exists(), "nothing is written");
+}
+
+#[test]
+fn outputs_are_not_overwritten_unasked() {
+    let folder = folder();
+    let out = folder.path().join("t.csv");
+    fs::write(&out, "precious").expect("the file can be written");
+    let arguments = ["simulate", "--time", "1", "--out", "t.csv"];
+    assert_refused(folder.path(), &arguments, &["t.csv exists", "--force"]);
+    assert_eq!(fs::read_to_string(&out).expect("it is there"), "precious");
+    let forced = ["simulate", "--time", "1", "--out", "t.csv", "--force"];
+    assert_eq!(sim_host(folder.path(), &forced).status.code(), Some(0));
+    let csv = fs::read_to_string(&out).expect("it is there");
+    assert!(csv.starts_with("time_s,sideslip_rad,yaw_rate_rad_per_s,"));
+    assert_eq!(csv.lines().count(), 1001);
+    // A folder that is not there, or is a file.
+    for out in ["missing/t.csv", "t.csv/u.csv"] {
+        assert_refused(
+            folder.path(),
+            &["simulate", "--time", "1", "--out", out],
+            &["cannot write into"],
+        );
+    }
+}
+
+#[test]
+fn configurations_are_complete_and_read_back() {
+    let folder = folder();
+    for preset in ["reconstruction", "printed"] {
+        let printed = sim_host(folder.path(), &["config", "--preset", preset]);
+        assert_eq!(printed.status.code(), Some(0));
+        fs::write(folder.path().join("c.toml"), &printed.stdout).expect("the file can be written");
+        let again = sim_host(folder.path(), &["config", "--config", "c.toml"]);
+        assert_eq!(again.stdout, printed.stdout);
+    }
+}
+
+#[test]
+fn help_has_examples() {
+    let folder = folder();
+    for command in ["verify", "simulate", "config", "decode", "qemu"] {
+        let help = sim_host(folder.path(), &[command, "--help"]);
+        assert_eq!(help.status.code(), Some(0));
+        let text = String::from_utf8_lossy(&help.stdout);
+        assert!(
+            text.contains("Example") && text.contains(&format!("sim-host {command}")),
+            "{text}"
+        );
+    }
+}
+
+/// A small image that is no firmware, or none at all.
+#[test]
+fn images_are_checked() {
+    let folder = folder();
+    fs::write(folder.path().join("text"), "not an image").expect("the file can be written");
+    for command in [["qemu"].as_slice(), &["verify", "--firmware"]] {
+        let with = |image| [command, &[image]].concat();
+        assert_refused(
+            folder.path(),
+            &with("missing"),
+            &["missing", "cargo xtask firmware"],
+        );
+        assert_refused(folder.path(), &with("text"), &["text is not an ELF file"]);
+        // This program itself: an ELF for another machine.
+        assert_refused(
+            folder.path(),
+            &with(SIM_HOST),
+            &["not for a 32-bit Arm Cortex-M"],
+        );
+    }
+    assert!(!folder.path().join("target").exists(), "no report is begun");
+}
+
+/// The smallest file that passes for an image: an ELF header for 32-bit Arm.
+fn arm_elf(folder: &Path) -> PathBuf {
+    let mut bytes = vec![0; 52];
+    bytes[..7].copy_from_slice(&[0x7F, b'E', b'L', b'F', 1, 1, 1]);
+    bytes[16] = 2; // executable
+    bytes[18] = 40; // Arm
+    bytes[20] = 1; // version
+    bytes[40] = 52; // length of this header
+    let path = folder.join("arm.elf");
+    fs::write(&path, bytes).expect("the file can be written");
+    path
+}
+
+#[test]
+fn a_missing_emulator_is_said() {
+    let folder = folder();
+    let image = arm_elf(folder.path());
+    let output = Command::new(SIM_HOST)
+        .arg("qemu")
+        .arg(image)
+        .env("PATH", folder.path())
+        .output()
+        .expect("the program starts");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(
+        message.contains("qemu-system-arm is not installed"),
+        "{message}"
+    );
+    assert!(message.contains("cargo xtask setup"), "{message}");
+}
+
+#[test]
+fn verify_checks_its_options_first() {
+    let folder = folder();
+    let image = arm_elf(folder.path());
+    let image = image.to_str().expect("the path is text");
+    let verify = |more: &[&'static str], parts: &[&str]| {
+        let mut arguments = vec!["verify", "--firmware", image];
+        arguments.extend(more);
+        assert_refused(folder.path(), &arguments, parts);
+    };
+    verify(
+        &["--duration-s", "0"],
+        &["--duration-s 0", "from 40 to 3600"],
+    );
+    verify(&["--duration-s", "nan"], &["--duration-s NaN"]);
+    verify(&["--time-out", "0"], &["--time-out 0", "from 0.1"]);
+    verify(&["--preset", "papre"], &["unknown preset"]);
+    fs::create_dir(folder.path().join("r")).expect("the folder can be made");
+    fs::write(folder.path().join("r/index.html"), "precious").expect("the file can be written");
+    verify(&["--out", "r"], &["index.html exists", "--force"]);
+    verify(&["--out", "arm.elf/r"], &["cannot make the folder"]);
+    let kept = fs::read_to_string(folder.path().join("r/index.html")).expect("it is there");
+    assert_eq!(kept, "precious");
+}
+
+/// A telemetry stream of three records.
+fn telemetry() -> Vec<u8> {
+    let state = State {
+        x: [0.1_f32, -0.2, 0.3, -0.4].into(),
+        friction: FrictionMode::Negative,
+    };
+    let header = Header {
+        samples_per_step: 2,
+        step_rate_hz: 1000,
+        pwm_period: 2500,
+        cost_clock_hz: 25_000_000,
+        instruction_rate_hz: 31_250_000,
+        initial: state,
+    };
+    let mut stream = Vec::new();
+    let mut buffer = [0; 64];
+    let length = header.encode(&mut buffer);
+    stream.extend(&buffer[..length]);
+    for index in 1..=3 {
+        let record = Record {
+            index,
+            state,
+            control_cost: 300,
+            pwm_cost: 60,
+        };
+        let length = record.encode([1562, 1563], &mut buffer);
+        stream.extend(&buffer[..length]);
+    }
+    let trailer = Trailer {
+        exit_code: 0,
+        records: 3,
+        overruns: 0,
+        stack_bytes: 1000,
+        final_duty: 1250,
+        neutral_duty: 1250,
+    };
+    let length = trailer.encode(&mut buffer);
+    stream.extend(&buffer[..length]);
+    stream
+}
+
+#[test]
+fn damaged_telemetry_is_refused() {
+    let folder = folder();
+    let path = folder.path().join("t.bin");
+    let whole = telemetry();
+    let decode = ["decode", "t.bin", "--out", "t.csv"];
+    for length in 0..whole.len() {
+        fs::write(&path, &whole[..length]).expect("the file can be written");
+        assert_refused(
+            folder.path(),
+            &decode,
+            &["telemetry is damaged", "cut short"],
+        );
+    }
+    for byte in (0..whole.len()).step_by(7) {
+        let mut flipped = whole.clone();
+        flipped[byte] ^= 0x10;
+        fs::write(&path, flipped).expect("the file can be written");
+        assert_refused(folder.path(), &decode, &["telemetry is"]);
+    }
+    assert!(!folder.path().join("t.csv").exists(), "nothing is written");
+    assert_refused(folder.path(), &["decode", "none.bin"], &["none.bin"]);
+
+    fs::write(&path, &whole).expect("the file can be written");
+    assert_eq!(sim_host(folder.path(), &decode).status.code(), Some(0));
+    let csv = fs::read_to_string(folder.path().join("t.csv")).expect("it is there");
+    assert_eq!(csv.lines().count(), 4);
+    assert!(
+        csv.lines()
+            .nth(1)
+            .expect("a row")
+            .ends_with(",negative,1563")
+    );
+}
