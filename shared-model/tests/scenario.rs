@@ -182,7 +182,7 @@ fn rates_must_fit_together() {
     let message = |control, pwm| {
         format!(
             "run.pwm_rate_hz = {pwm} and run.control_rate_hz = {control}: both must be whole numbers, the first a \
-             multiple of the second"
+             multiple of the second, at most 1000 times it"
         )
     };
     for (control, pwm) in [

@@ -7,9 +7,12 @@ use crate::outcome::Exit;
 use crate::{firmware, process, rustup, setup, workspace};
 
 /// Steps in debug, where overflow checks and debug assertions are on.
-const MODEL: [&str; 2] = ["--package", "shared-model"];
+const MODEL: [&str; 4] = ["--package", "shared-model", "--features", "serde"];
 /// The firmware's programs run in QEMU, started by tests of the host.
 const HOST: [&str; 4] = ["--release", "--workspace", "--exclude", "firmware"];
+
+/// What the linker misses where a panic can be reached.
+const MISSING_FUNCTION: &str = "a_panic_is_reachable_from_the_control_path";
 
 /// Sets up, builds and tests.
 pub fn run() -> Result<()> {
@@ -36,6 +39,21 @@ fn prove_panic_free(toolchain: &str) -> Result<()> {
     let all = firmware::build(toolchain, &["--bins"]);
     all.context(Exit::failed("`panic-free` did not build; a missing function in the linker's message means that a panic can be reached"))?;
     println!("   panic-free linked: no panic can be reached");
+
+    // A proof that cannot fail is none: with a panic put into the path, the link must miss the function.
+    let mut cargo = firmware::cargo(toolchain)?;
+    cargo
+        .arg("build")
+        .args(firmware::PROFILE)
+        .args(workspace::locked())
+        .args(["--bin", "panic-free", "--features", "reachable-panic"]);
+    let output = cargo.output().context("cargo does not start")?;
+    let seen = String::from_utf8_lossy(&output.stderr).contains(MISSING_FUNCTION);
+    if output.status.success() || !seen {
+        let why = "`panic-free` with a panic in its path did not fail as it should: the proof proves nothing";
+        return Err(Exit::failed(why).into());
+    }
+    println!("   with a panic put into the path it does not link: the proof can fail");
     Ok(())
 }
 
