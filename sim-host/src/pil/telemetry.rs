@@ -89,14 +89,15 @@ impl Recording {
         let mut duties =
             Vec::with_capacity(records.capacity() * usize::from(header.samples_per_step));
         let mut offset = HEADER_LEN;
+        let mut gap = None;
         while !is_trailer(&bytes[offset..]) {
             let last = records.last().map_or(0, |record: &Record| record.index);
             let duty = |code| duties.push(code);
             let record = Record::decode(&bytes[offset..], header.samples_per_step, duty)
                 .map_err(|error| damaged(offset, &format!("after record {last}"), error))?;
-            if record.index != last + 1 {
-                let found = record.index;
-                return Err(TelemetryError::Gap { last, found });
+            let found = record.index;
+            if found != last + 1 {
+                gap.get_or_insert(TelemetryError::Gap { last, found });
             }
             records.push(record);
             offset += length;
@@ -106,6 +107,10 @@ impl Recording {
         let excess = bytes.len() - offset - TRAILER_LEN;
         if excess > 0 {
             return Err(TelemetryError::Excess { bytes: excess });
+        }
+        // Records that the firmware itself counted as lost are missing in an intact stream.
+        if let (Some(gap), 0) = (gap, trailer.overruns) {
+            return Err(gap);
         }
         // A firmware that ended in a fault could not write its last records.
         if trailer.exit_code == 0 && trailer.records as usize != records.len() {
