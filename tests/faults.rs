@@ -5,8 +5,9 @@ use shared_model::Scenario;
 use shared_model::tire::TireModel;
 use sim_host::pil::qemu::{Machine, RunError};
 use sim_host::pil::telemetry::Recording;
+use std::process::Command;
 use std::time::{Duration, Instant};
-use tests::{TIME_OUT, image, record, run};
+use tests::{TIME_OUT, image, record, run, sim_host};
 
 const OVERRUN: i32 = 12;
 const WATCHDOG: i32 = 15;
@@ -58,6 +59,31 @@ fn a_firmware_that_hangs_is_stopped_and_gone() {
     assert!(matches!(error, RunError::TimedOut { .. }), "{error}");
     assert!(start.elapsed() >= limit);
     assert!(!is_running(&marker), "the emulator is left behind");
+}
+
+#[test]
+fn the_runner_says_that_a_firmware_hangs_and_passes_exit_codes_on() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let drill = |arguments: &[&str]| {
+        let output = Command::new(sim_host())
+            .args(["qemu", "--time-out", "2"])
+            .arg(image("fault-drill").path)
+            .args(arguments)
+            .current_dir(folder.path())
+            .output()
+            .expect("the program starts");
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        (output.status.code(), message)
+    };
+    let (code, message) = drill(&["hang"]);
+    assert_eq!(code, Some(2), "{message}");
+    assert!(message.contains("did not end within 2 s"), "{message}");
+    let (code, message) = drill(&["hard-fault"]);
+    assert_eq!(code, Some(14), "{message}");
+    assert!(
+        message.contains("hard fault; the PWM was put to neutral"),
+        "{message}"
+    );
 }
 
 /// Whether a process has `marker` in its command line.

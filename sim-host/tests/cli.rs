@@ -260,7 +260,7 @@ fn verify_checks_its_options_first() {
     };
     verify(
         &["--duration-s", "0"],
-        &["--duration-s 0", "from 40 to 3600"],
+        &["--duration-s 0", "from 60 to 3600"],
     );
     verify(&["--duration-s", "nan"], &["--duration-s NaN"]);
     verify(&["--time-out", "0"], &["--time-out 0", "from 0.1"]);

@@ -54,3 +54,22 @@ pub fn record(scenario: &Scenario<f32>, machine: Machine, exit_code: i32) -> Rec
     assert_eq!(finished.exit_code, exit_code, "log: {:?}", finished.log);
     Recording::open(&folder.path().join(TELEMETRY)).unwrap_or_else(|error| panic!("{error}"))
 }
+
+/// The command-line program, which cargo builds beside the tests.
+///
+/// # Panics
+/// If it is not there.
+pub fn sim_host() -> PathBuf {
+    let test = std::env::current_exe().expect("the test is a file");
+    let program = test
+        .ancestors()
+        .nth(2)
+        .expect("tests are in target/PROFILE/deps")
+        .join("sim-host");
+    assert!(
+        program.exists(),
+        "{} is not built: run `cargo xtask test`",
+        program.display()
+    );
+    program
+}

@@ -49,7 +49,7 @@ pub struct Arguments {
 }
 
 /// Shorter runs hold too few cycles for a period and an exponent.
-const DURATIONS_S: std::ops::RangeInclusive<f64> = 40.0..=3600.0;
+const DURATIONS_S: std::ops::RangeInclusive<f64> = 60.0..=3600.0;
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let duration_s = arguments.duration_s;

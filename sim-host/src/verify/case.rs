@@ -4,7 +4,7 @@ use super::{Options, Progress, VerifyError};
 use crate::chaos::lyapunov::{self, Exponent};
 use crate::chaos::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
 use crate::equivalence::{self, Bits, OneStep};
-use crate::pil::qemu::{self, Finished, Machine};
+use crate::pil::qemu::{self, Finished, Machine, RunError};
 use crate::pil::settings;
 use crate::pil::telemetry::Recording;
 use crate::report::RunReport;
@@ -256,9 +256,12 @@ fn run_firmware(
         run
     });
     let title = || case.title.clone();
-    let Finished { exit_code, log } = run.map_err(|source| VerifyError::Run {
-        title: title(),
-        source,
+    let Finished { exit_code, log } = run.map_err(|source| match source {
+        RunError::Interrupted => VerifyError::Interrupted,
+        source => VerifyError::Run {
+            title: title(),
+            source,
+        },
     })?;
     // An overrun is a failed check, not a failed job: the telemetry up to it can be compared.
     if exit_code != 0 && exit_code != qemu::OVERRUN {

@@ -41,6 +41,9 @@ pub enum VerifyError {
         /// When.
         time_s: f64,
     },
+    /// The user asked to stop.
+    #[error("interrupted; no report was written")]
+    Interrupted,
     /// The emulator or the firmware did not end as it should.
     #[error("{title}: {source}")]
     Run {
