@@ -3,6 +3,7 @@
 //! | question | module |
 //! |---|---|
 //! | how does a scenario move? | [`simulate`] |
+//! | how is a motion stepped in a sweep? | [`motion`] |
 //! | is a motion chaotic, or which period has it? | [`chaos`] |
 //! | how is the firmware run? | [`pil`] |
 //! | do firmware and host agree? | [`equivalence`] |
@@ -14,6 +15,7 @@ pub mod chaos;
 pub mod config;
 pub mod engine;
 pub mod equivalence;
+pub mod motion;
 pub mod pil;
 pub mod report;
 pub mod simulate;

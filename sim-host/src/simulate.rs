@@ -1,5 +1,6 @@
 //! The ECU's program run on the host, in any arithmetic.
 
+use crate::motion::Motion;
 use crate::trace::Trace;
 use shared_model::controller::Ecu;
 use shared_model::vehicle::State;
@@ -37,12 +38,7 @@ pub fn simulate<T: Real>(scenario: &Scenario<T>) -> Result<Trace, InvalidScenari
 pub fn settle<T: Real>(scenario: &Scenario<T>, time_s: f64) -> Result<State<T>, InvalidScenario> {
     let mut scenario = *scenario;
     scenario.dither.waveform = shared_model::dither::Waveform::None;
-    let mut ecu = Ecu::new(&scenario)?;
-    let steps = (time_s * scenario.model_rate_hz().to_f64()).round() as u64;
-    for _ in 0..steps {
-        ecu.control.run(T::zero());
-    }
-    Ok(*ecu.control.state())
+    Ok(*Motion::new(&scenario)?.run(time_s))
 }
 
 /// The scenario started in the given state.

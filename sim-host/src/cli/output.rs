@@ -1,9 +1,11 @@
 //! Output files: never overwritten unasked, never left half written.
 
 use anyhow::{Context, bail};
+use clap::Args;
+use serde::Serialize;
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 /// Refuses an output that is there already, before any work is done for it.
@@ -45,5 +47,65 @@ impl<'a> Output<'a> {
         let file = self.writer.into_inner().with_context(failed)?;
         file.persist(self.path).with_context(failed)?;
         Ok(())
+    }
+}
+
+/// Where an analysis writes its results. Without any, a summary is all there is.
+#[derive(Args)]
+pub struct Destinations {
+    /// Write the results as CSV
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the results as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw them as an SVG figure
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+    /// Overwrite files that exist
+    #[arg(long)]
+    force: bool,
+}
+
+impl Destinations {
+    /// Refuses files that are there already, before any work is done for them.
+    pub fn check_free(&self) -> anyhow::Result<()> {
+        let files = [&self.out, &self.json, &self.figure];
+        files
+            .into_iter()
+            .flatten()
+            .try_for_each(|path| check_free(path, self.force))
+    }
+
+    /// Writes the rows as CSV, all results as JSON, and the figure: each if it was asked for.
+    pub fn write(
+        &self,
+        rows: impl IntoIterator<Item = impl Serialize>,
+        results: &impl Serialize,
+        draw: impl FnOnce() -> anyhow::Result<String>,
+    ) -> anyhow::Result<()> {
+        if let Some(path) = &self.out {
+            let mut output = Output::create(path, self.force)?;
+            let mut csv = csv::Writer::from_writer(output.writer());
+            for row in rows {
+                csv.serialize(row)?;
+            }
+            csv.flush()?;
+            drop(csv);
+            output.finish()?;
+        }
+        if let Some(path) = &self.json {
+            self.text(path, &(serde_json::to_string_pretty(results)? + "\n"))?;
+        }
+        if let Some(path) = &self.figure {
+            self.text(path, &draw()?)?;
+        }
+        Ok(())
+    }
+
+    fn text(&self, path: &Path, text: &str) -> anyhow::Result<()> {
+        let mut output = Output::create(path, self.force)?;
+        output.writer().write_all(text.as_bytes())?;
+        output.finish()
     }
 }

@@ -1,0 +1,73 @@
+//! The vehicle's motion on its own, without PWM and telemetry: what sweeps and analyses step.
+
+use shared_model::dither::{Application, Injection};
+use shared_model::vehicle::{Model, State};
+use shared_model::{InvalidScenario, Real, Scenario, integrate};
+
+/// A motion of the averaged system. The dither, if there is one, is on from the start.
+#[derive(Debug, Clone)]
+pub struct Motion<T> {
+    model: Model<T>,
+    state: State<T>,
+    step_s: T,
+    injection: Injection<T>,
+}
+
+impl<T: Real> Motion<T> {
+    /// The motion of a scenario from its start.
+    ///
+    /// # Errors
+    /// If the scenario is not valid.
+    pub fn new(scenario: &Scenario<T>) -> Result<Self, InvalidScenario> {
+        scenario.validate()?;
+        let mut averaged = *scenario;
+        averaged.dither.application = Application::Averaged;
+        let model = Model::new(&averaged);
+        Ok(Self {
+            state: model.initial_state(&averaged),
+            step_s: averaged.step_s(),
+            injection: averaged.dither.injection(T::zero()),
+            model,
+        })
+    }
+
+    /// One step.
+    pub fn step(&mut self) -> &State<T> {
+        integrate::step(&self.model, &mut self.state, self.step_s, self.injection);
+        &self.state
+    }
+
+    /// As many steps as fit into `time_s`.
+    pub fn run(&mut self, time_s: f64) -> &State<T> {
+        let steps = (time_s / self.step_s.to_f64()).round() as u64;
+        for _ in 0..steps {
+            self.step();
+        }
+        &self.state
+    }
+
+    /// The present state.
+    pub fn state(&self) -> &State<T> {
+        &self.state
+    }
+
+    /// Goes on from another state.
+    pub fn set_state(&mut self, state: State<T>) {
+        self.state = state;
+    }
+
+    /// The right-hand side and its constants.
+    pub fn model(&self) -> &Model<T> {
+        &self.model
+    }
+
+    /// What the dither does to the nonlinearities.
+    pub fn injection(&self) -> Injection<T> {
+        self.injection
+    }
+
+    /// Length of a step, s.
+    pub fn step_s(&self) -> T {
+        self.step_s
+    }
+}
