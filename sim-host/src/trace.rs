@@ -1,10 +1,16 @@
 //! A recorded motion: states at a fixed step, and the duty codes of the PWM.
 
 use nalgebra::Vector4;
+use shared_model::Real;
 use shared_model::vehicle::State;
 
 /// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
 const BOUND: f64 = 1e3;
+
+/// The state is one of a vehicle, not of a motion that diverges.
+pub(crate) fn is_bounded<T: Real>(state: &State<T>) -> bool {
+    state.x.iter().all(|value| value.to_f64().abs() < BOUND)
+}
 
 /// A motion sampled at every model step.
 #[derive(Debug, Clone)]
@@ -63,8 +69,7 @@ impl Trace {
 
     /// Time at which the motion leaves all physical bounds, if it does, s.
     pub fn diverges_at_s(&self) -> Option<f64> {
-        let bounded = |state: &State<f64>| state.x.iter().all(|value| value.abs() < BOUND);
-        let first = self.states.iter().position(|state| !bounded(state))?;
+        let first = self.states.iter().position(|state| !is_bounded(state))?;
         Some(self.time_s(first))
     }
 
