@@ -1,5 +1,6 @@
 //! The report: figures, one HTML page, and the verdict for programs.
 
+pub mod chart;
 mod figure;
 mod file;
 mod html;

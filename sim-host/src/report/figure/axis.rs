@@ -78,15 +78,35 @@ impl Axis {
         let (low, high) = bounds(logs).unwrap_or((0.0, 1.0));
         let high = high.ceil().max(low.floor() + 1.0);
         let low = low.floor().max(high - MOST_DECADES);
-        let step = ((high - low) / ticks.max(1) as f64).ceil().max(1.0);
-        let first = (low / step).ceil() as i32;
-        let last = (high / step).floor() as i32;
-        let power = |exponent: f64| 10_f64.powf(exponent);
+        Self::logarithmic(name, 10_f64.powf(low), 10_f64.powf(high), ticks)
+    }
+
+    /// A logarithmic axis from `low` to `high`, both greater than 0, with at most about `ticks` ticks: at powers of ten, or
+    /// at 1, 2 and 5 times them where the axis spans less than two decades.
+    pub fn logarithmic(name: &str, low: f64, high: f64, ticks: usize) -> Self {
+        let bounded = |value: f64| value.log10().clamp(-MOST_DECADE, MOST_DECADE);
+        let from = bounded(low);
+        let to = bounded(high).max(from + 1e-3);
+        let step = ((to - from) / ticks.max(1) as f64).ceil().max(1.0);
+        let factors: &[f64] = if to - from < 2.0 {
+            &[1.0, 2.0, 5.0]
+        } else {
+            &[1.0]
+        };
+        let first = (from / step - 1e-9).floor() as i32;
+        let last = (to / step + 1e-9).floor() as i32;
+        let within = |tick: &f64| tick.log10() >= from - 1e-9 && tick.log10() <= to + 1e-9;
         Self {
             name: name.into(),
-            low: power(low),
-            high: power(high),
-            ticks: (first..=last).map(|n| power(f64::from(n) * step)).collect(),
+            low: 10_f64.powf(from),
+            high: 10_f64.powf(to),
+            ticks: (first..=last)
+                .flat_map(|n| {
+                    let power = 10_f64.powf(f64::from(n) * step);
+                    factors.iter().map(move |factor| factor * power)
+                })
+                .filter(within)
+                .collect(),
             scale: Scale::Logarithmic,
         }
     }
@@ -99,14 +119,41 @@ impl Axis {
         }
     }
 
-    /// Where a value lies: 0 at the lower end, 1 at the upper.
-    fn fraction(&self, value: f64) -> f64 {
-        let place = |value: f64| match self.scale {
+    /// The quantity that is proportional to length on the axis: the value, or its decimal logarithm.
+    pub fn place(&self, value: f64) -> f64 {
+        match self.scale {
             Scale::Linear { .. } => value,
             Scale::Logarithmic => value.max(f64::MIN_POSITIVE).log10(),
-        };
-        let (low, high) = (place(self.low), place(self.high));
-        ((place(value) - low) / (high - low)).clamp(0.0, 1.0)
+        }
+    }
+
+    /// The value at a place; the inverse of [`place`](Self::place).
+    pub fn value(&self, place: f64) -> f64 {
+        match self.scale {
+            Scale::Linear { .. } => place,
+            Scale::Logarithmic => 10_f64.powf(place),
+        }
+    }
+
+    /// Whether a value can be drawn: it is finite, and on a logarithmic axis greater than 0.
+    pub fn takes(&self, value: f64) -> bool {
+        value.is_finite() && (value > 0.0 || matches!(self.scale, Scale::Linear { .. }))
+    }
+
+    /// Whether a value lies between the ends.
+    pub fn holds(&self, value: f64) -> bool {
+        value >= self.low && value <= self.high
+    }
+
+    /// Places of the lower and the upper end.
+    pub fn ends(&self) -> (f64, f64) {
+        (self.place(self.low), self.place(self.high))
+    }
+
+    /// Where a value lies: 0 at the lower end, 1 at the upper.
+    pub fn fraction(&self, value: f64) -> f64 {
+        let (low, high) = self.ends();
+        ((self.place(value) - low) / (high - low)).clamp(0.0, 1.0)
     }
 }
 
@@ -134,12 +181,25 @@ impl ValueFormatter<f64> for Axis {
     fn format_ext(&self, tick: &f64) -> String {
         match self.scale {
             Scale::Linear { decimals } => format!("{tick:.decimals$}").replace('-', "\u{2212}"),
-            Scale::Logarithmic => power_of_ten(tick.log10().round() as i32),
+            Scale::Logarithmic => {
+                let exponent = tick.log10().round() as i32;
+                let factor = tick / 10_f64.powi(exponent);
+                if (factor - 1.0).abs() < 1e-6 {
+                    power_of_ten(exponent)
+                } else if (1e-3..1e5).contains(tick) {
+                    format!("{}", (tick * 1e6).round() / 1e6)
+                } else {
+                    let below = tick.log10().floor() as i32;
+                    let factor = (tick / 10_f64.powi(below)).round();
+                    format!("{factor}\u{b7}{}", power_of_ten(below))
+                }
+            }
         }
     }
 }
 
-fn bounds(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
+/// Least and greatest of the finite values.
+pub fn bounds(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values
         .into_iter()
         .filter(|value| value.is_finite())
@@ -225,6 +285,19 @@ mod tests {
         );
         assert_eq!(axis.map(&0.0, (0, 60)), 0);
         assert_eq!(axis.map(&1.0, (0, 60)), 40);
+    }
+
+    #[test]
+    fn a_short_logarithmic_axis_has_ticks_between_powers_of_ten() {
+        let axis = Axis::logarithmic("", 30.0, 800.0, 8);
+        assert_eq!(labels(&axis), ["50", "10\u{b2}", "200", "500"]);
+        let axis = Axis::logarithmic("", 1.0, 2e4, 8);
+        assert_eq!(labels(&axis).len(), 5);
+        assert_eq!(axis.map(&2e4, (0, 60)), 60);
+        assert_eq!(
+            labels(&Axis::logarithmic("", 1e6, 1e7, 8))[1],
+            "2\u{b7}10\u{2076}"
+        );
     }
 
     #[test]

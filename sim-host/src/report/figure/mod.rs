@@ -1,14 +1,14 @@
 //! The figures, each an SVG document.
 
-mod axis;
+pub(super) mod axis;
 mod divergence;
 mod instructions;
 mod one_step_defect;
-mod panel;
+pub(super) mod panel;
 mod phase_portrait;
 mod pwm_trace;
-mod reduce;
-mod style;
+pub(super) mod reduce;
+pub(super) mod style;
 mod time_response;
 
 use super::ReportInput;

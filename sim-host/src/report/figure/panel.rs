@@ -3,21 +3,25 @@
 use super::axis::Axis;
 use super::reduce::Point;
 use super::style::{
-    Area, BAND, FAINT_INK, GRID, INK, Line, TEXT_FONT, TICK_FONT, text, text_width,
+    Area, BAND, FAINT_INK, GRID, INK, Line, TEXT_FONT, TICK_FONT, UNITS_PER_PIXEL, text, text_width,
 };
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
+use std::collections::BTreeSet;
 
 /// Height of the line above a panel that holds its caption.
 pub const CAPTION: u32 = 42;
 /// Height below a panel that its tick labels need.
-const TICKS: u32 = 44;
+pub const TICKS: u32 = 44;
 /// Height below a panel that its tick labels and its axis name need.
 pub const TICKS_AND_NAME: u32 = 86;
 /// Room at the left that accents of the axis name may need.
 const MARGIN: u32 = 12;
 const LEFT: u32 = 128;
-const RIGHT: u32 = 36;
+/// Room left of a panel's axes.
+pub const BESIDE: u32 = MARGIN + LEFT;
+/// Room right of a panel's axes.
+pub const RIGHT: u32 = 36;
 const TICK: i32 = 7;
 
 /// Height of a stack of panels of the given height, only the last of which names its horizontal axis.
@@ -94,13 +98,31 @@ impl<'a> Panel<'a> {
         Ok(panel)
     }
 
-    /// Width and height of the axes over the extents of the values on them.
-    pub fn units_per_value(&self) -> Point {
+    /// Width and height of the axes over their extents: in their values, or decades on a logarithmic axis.
+    pub fn units_per_place(&self) -> Point {
         let (width, height) = self.chart.plotting_area().dim_in_pixel();
+        let extent = |axis: &Axis| axis.ends().1 - axis.ends().0;
         (
-            f64::from(width) / (self.x.high - self.x.low),
-            f64::from(height) / (self.y.high - self.y.low),
+            f64::from(width) / extent(&self.x),
+            f64::from(height) / extent(&self.y),
         )
+    }
+
+    /// Small dots, those in the same pixel once.
+    pub fn dots(&self, points: &[Point], line: Line) -> anyhow::Result<()> {
+        let area = self.chart.plotting_area();
+        let places = points.iter().map(|point| area.map_coordinate(point));
+        let runs = pixel_runs(places);
+        if !runs.is_empty() {
+            let (left, top) = area.get_base_pixel();
+            let ends: Vec<(i32, i32)> = runs
+                .iter()
+                .flat_map(|&(x, from, to)| [(x - left, from - top), (x - left, to - top)])
+                .collect();
+            area.strip_coord_spec()
+                .draw(&PathElement::new(ends, line))?;
+        }
+        Ok(())
     }
 
     /// Lines through the points of each curve; says "no data" if none has two of them.
@@ -207,8 +229,24 @@ impl<'a> Panel<'a> {
     }
 }
 
+/// Vertical runs of pixels with a place in them: column, first row, last row.
+fn pixel_runs(places: impl Iterator<Item = (i32, i32)>) -> Vec<(i32, i32, i32)> {
+    let unit = UNITS_PER_PIXEL as i32;
+    let pixels: BTreeSet<(i32, i32)> = places
+        .map(|(x, y)| (x.div_euclid(unit) * unit, y.div_euclid(unit) * unit))
+        .collect();
+    let mut runs: Vec<(i32, i32, i32)> = Vec::new();
+    for (x, y) in pixels {
+        match runs.last_mut() {
+            Some(run) if run.0 == x && run.2 + unit == y => run.2 = y,
+            _ => runs.push((x, y, y)),
+        }
+    }
+    runs
+}
+
 /// The text with as many of its characters as the width takes, and an ellipsis for the others.
-fn shortened(text: &str, width: i32) -> String {
+pub fn shortened(text: &str, width: i32) -> String {
     if text_width(text, TEXT_FONT) <= width {
         return text.into();
     }
@@ -226,6 +264,15 @@ fn shortened(text: &str, width: i32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn dots_in_one_pixel_count_once_and_neighbours_make_runs() {
+        let places = [(4, 4), (5, 5), (4, 6), (4, 12), (8, 6), (4, 4)];
+        assert_eq!(
+            pixel_runs(places.into_iter()),
+            [(4, 4, 6), (4, 12, 12), (8, 6, 6)]
+        );
+    }
 
     #[test]
     fn only_long_captions_are_shortened() {

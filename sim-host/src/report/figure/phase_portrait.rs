@@ -40,7 +40,7 @@ pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> anyhow::Resul
 }
 
 fn orbit(panel: &Panel, states: &[Point], line: Line) -> anyhow::Result<()> {
-    let scale = panel.units_per_value();
+    let scale = panel.units_per_place();
     let points = curve(states.iter().copied(), scale, MOST_POINTS);
     panel.lines(&[(&points, line)])?;
     if let Some(first) = points.first() {

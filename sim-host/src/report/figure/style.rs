@@ -8,7 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 /// Width of a figure in units of the drawing; its coordinates are whole units, so there are two a pixel.
 pub const WIDTH: u32 = 1600;
 /// Units of the drawing in a CSS pixel.
-const UNITS_PER_PIXEL: u32 = 2;
+pub const UNITS_PER_PIXEL: u32 = 2;
 
 /// Where a figure or a part of it is drawn.
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -69,6 +69,17 @@ pub const RUNS: [Line; 6] = [
     line(RGBColor(0x5e, 0x5e, 0x60), 3, "8 4"),
 ];
 
+/// A level to compare with.
+pub const LEVEL: Line = line(RGBColor(0x77, 0x77, 0x7a), 2, "");
+/// Series of dots that share a panel. A line of this look is drawn as a piece between each two of its points, as long as a dot
+/// where they coincide.
+pub const DOTS: [Line; 4] = [
+    line(RGBColor(0x10, 0x2b, 0x5d), 3, ""),
+    line(RGBColor(0xc9, 0x6f, 0x04), 3, ""),
+    line(RGBColor(0x2f, 0x8c, 0x58), 3, ""),
+    line(RGBColor(0x7b, 0x50, 0xb6), 3, ""),
+];
+
 impl From<Line> for ShapeStyle {
     fn from(line: Line) -> Self {
         ShapeStyle {
@@ -84,6 +95,8 @@ impl From<Line> for ShapeStyle {
 pub enum Sample {
     /// A piece of line.
     Line(Line),
+    /// A dot.
+    Dot(Line),
     /// A piece of shaded band.
     Band,
 }
@@ -170,6 +183,10 @@ fn legend_entry(
         Sample::Line(line) => {
             area.draw(&PathElement::new([(x, y), (x + SAMPLE_WIDTH, y)], line))?;
         }
+        Sample::Dot(line) => {
+            let style = ShapeStyle::from(line).filled();
+            area.draw(&Circle::new((x + SAMPLE_WIDTH - 12, y), 5, style))?;
+        }
         Sample::Band => {
             let corners = [(x, y - 12), (x + SAMPLE_WIDTH, y + 12)];
             area.draw(&Rectangle::new(corners, BAND.filled()))?;
@@ -199,6 +216,36 @@ fn finish(svg: &str, (width, height): (u32, u32), title: &str) -> String {
             out = out.replace(&stroke, &dashed);
         }
     }
+    for line in DOTS {
+        out = dotted(&out, line);
+    }
+    out
+}
+
+/// The drawing with each polyline of a look turned into pieces between each two of its points, with round ends.
+fn dotted(svg: &str, line: Line) -> String {
+    let RGBColor(r, g, b) = line.colour;
+    let start = format!("<polyline fill=\"none\" stroke=\"#{r:02X}{g:02X}{b:02X}\"");
+    let mut parts = svg.split(&start);
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (points, rest) = part
+            .split_once("points=\"")
+            .and_then(|(_, rest)| rest.split_once('"'))
+            .unwrap_or(("", part));
+        let width = line.width;
+        let stroke = format!("stroke=\"#{r:02X}{g:02X}{b:02X}\" stroke-width=\"{width}\"");
+        out += &format!("<path fill=\"none\" {stroke} stroke-linecap=\"round\" d=\"");
+        let mut points = points.split_ascii_whitespace();
+        while let (Some(from), Some(to)) = (points.next(), points.next()) {
+            match to.split_once(',') {
+                Some((_, y)) if from != to => out += &format!("M{from}V{y}"),
+                _ => out += &format!("M{from}h0"),
+            }
+        }
+        out += "\"";
+        out += rest;
+    }
     out
 }
 
@@ -208,9 +255,10 @@ mod tests {
 
     #[test]
     fn no_two_lines_have_the_same_colour() {
-        let lines: Vec<Line> = [MAIN, OTHER, ALONE, LIMIT, INSTANT]
+        let lines: Vec<Line> = [MAIN, OTHER, ALONE, LIMIT, INSTANT, LEVEL]
             .into_iter()
             .chain(RUNS)
+            .chain(DOTS)
             .collect();
         for (n, line) in lines.iter().enumerate() {
             assert!(lines[..n].iter().all(|other| other.colour != line.colour));
@@ -227,6 +275,23 @@ mod tests {
         })
         .unwrap();
         assert_eq!(svg.matches("stroke-dasharray=\"18 8\"").count(), 2);
+    }
+
+    #[test]
+    fn dots_are_pieces_of_a_path() {
+        let svg = figure("heading", &[], 100, |area| {
+            area.draw(&PathElement::new(
+                [(1, 2), (1, 2), (4, 6), (4, 10)],
+                DOTS[0],
+            ))?;
+            Ok(())
+        })
+        .unwrap();
+        assert!(!svg.contains("<polyline"), "{svg}");
+        let path = svg.split("d=\"").nth(1).unwrap();
+        let pieces = path.split('"').next().unwrap();
+        assert_eq!(pieces.matches("h0M").count(), 1, "{pieces}");
+        assert_eq!(pieces.matches('V').count(), 1, "{pieces}");
     }
 
     #[test]
