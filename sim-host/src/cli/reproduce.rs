@@ -46,8 +46,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             .expect("the template is valid"),
     );
     bar.enable_steady_tick(Duration::from_millis(200));
-    let summary = reproduce(&arguments.out, &options, &INTERRUPTED, &|progress| {
-        match progress {
+    let summary = reproduce(
+        &arguments.out,
+        &options,
+        &INTERRUPTED,
+        &|progress| match progress {
             Progress::Begins {
                 number,
                 of,
@@ -62,8 +65,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
                 }
             }
             Progress::Point => bar.inc(1),
-        }
-    })?;
+        },
+    )?;
     bar.finish_and_clear();
     show(&summary);
     let page = arguments.out.join("index.html");
@@ -72,7 +75,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         "stopped; what is done is in {}, and the same command goes on from there",
         page.display()
     );
-    println!("page: {} ({:.0} s)", page.display(), start.elapsed().as_secs_f64());
+    println!(
+        "page: {} ({:.0} s)",
+        page.display(),
+        start.elapsed().as_secs_f64()
+    );
     Ok(Done::Well)
 }
 
@@ -81,7 +88,13 @@ fn scenarios(arguments: &Arguments) -> anyhow::Result<Vec<(String, Scenario<f64>
         let scenario = load(Some(file), None)?;
         validate(&scenario)?;
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-        let plain = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+        let plain = |c: char| {
+            if c.is_ascii_alphanumeric() {
+                c.to_ascii_lowercase()
+            } else {
+                '-'
+            }
+        };
         return Ok(vec![(stem.chars().map(plain).collect(), scenario)]);
     }
     let presets = Preset::ALL.iter();

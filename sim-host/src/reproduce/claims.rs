@@ -64,7 +64,11 @@ pub fn of_speeds(preset: &str, sweep: &Regions) -> Vec<Judgement> {
                 100.0 * share,
                 exponents(sweep, from, to, kind)
             ),
-            distance: edges.iter().map(edge_distance).collect::<Vec<_>>().join("; "),
+            distance: edges
+                .iter()
+                .map(edge_distance)
+                .collect::<Vec<_>>()
+                .join("; "),
             verdict,
         }
     };
@@ -78,7 +82,11 @@ pub fn of_square_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
     let chaotic_at_first = start == Some(Kind::Chaos);
     let tamed = end.is_some_and(|kind| matches!(kind, Kind::Periodic(_) | Kind::Equilibrium));
     let periodic = matches!(end, Some(Kind::Periodic(_)));
-    let last_chaos = sweep.edges.iter().rev().find(|edge| edge.below == Kind::Chaos);
+    let last_chaos = sweep
+        .edges
+        .iter()
+        .rev()
+        .find(|edge| edge.below == Kind::Chaos);
     let at = kind_at(sweep, 0.1);
     vec![
         Judgement {
@@ -131,7 +139,10 @@ pub fn of_sine_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
             distance: if edges.is_empty() {
                 "no edge of period-1 in the sweep".into()
             } else {
-                format!("period-1 begins or ends at {} (\u{b1} 0.25 mV)", edges.join(", "))
+                format!(
+                    "period-1 begins or ends at {} (\u{b1} 0.25 mV)",
+                    edges.join(", ")
+                )
             },
             verdict: match share {
                 share if share > 0.999 => Reproduced::Yes,
@@ -154,7 +165,11 @@ pub fn of_sine_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
 }
 
 fn yes_if(holds: bool) -> Reproduced {
-    if holds { Reproduced::Yes } else { Reproduced::No }
+    if holds {
+        Reproduced::Yes
+    } else {
+        Reproduced::No
+    }
 }
 
 fn name(kind: Option<Kind>) -> String {
@@ -164,7 +179,10 @@ fn name(kind: Option<Kind>) -> String {
 /// The kind at the sample nearest to a value.
 fn kind_at(sweep: &Regions, value: f64) -> Option<Kind> {
     let apart = |sample: &&Sample| (sample.value - value).abs();
-    let nearest = sweep.samples.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    let nearest = sweep
+        .samples
+        .iter()
+        .min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
     Some(nearest.attractor.kind)
 }
 

@@ -55,9 +55,10 @@ pub fn suppression(named: &Named, _quality: Quality, watch: Watch) -> Made {
             chart: chart(number, &before, &after, scenario.dither.start_time_s),
             table: table(&before, &after),
         });
-        material
-            .findings
-            .push((format!("{word} dither of {amplitude_v} V"), format!("ends on {ends}")));
+        material.findings.push((
+            format!("{word} dither of {amplitude_v} V"),
+            format!("ends on {ends}"),
+        ));
         (watch.done)();
     }
     Ok(material)
@@ -80,7 +81,9 @@ fn chart(number: &str, before: &Trace, after: &Trace, start_s: f64) -> Chart {
     let orbit = |trace: &Trace| {
         let settled = &trace.states[trace.index_after(SETTLED_S)..];
         let shown = settled.iter().step_by(SHOWN_EVERY);
-        shown.map(|state| (state.x[SIDESLIP], state.x[YAW_RATE])).collect()
+        shown
+            .map(|state| (state.x[SIDESLIP], state.x[YAW_RATE]))
+            .collect()
     };
     Chart {
         heading: format!("Figure {number}: chaos suppressed"),
@@ -157,8 +160,12 @@ pub fn averaging(named: &Named, quality: Quality, watch: Watch) -> Made {
                 curves[1].push((one.frequency_rad_per_s, swing.abs()));
             }
         }
-        let apart = compared.iter().filter(|one| one.period != one.averaged_period);
-        let apart: Vec<String> = apart.map(|one| format!("{:.0}", one.frequency_rad_per_s)).collect();
+        let apart = compared
+            .iter()
+            .filter(|one| one.period != one.averaged_period);
+        let apart: Vec<String> = apart
+            .map(|one| format!("{:.0}", one.frequency_rad_per_s))
+            .collect();
         let word = format!("{waveform:?} of {amplitude_v} V");
         material.findings.push((
             format!("Averaging, {}", word.to_lowercase()),

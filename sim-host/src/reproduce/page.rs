@@ -35,7 +35,10 @@ pub fn write(
         (table(judgements))
         @for piece in &pieces { (piece) }
     };
-    file::replace(&folder.join("index.html"), &html::document(TITLE, &body).into_string())
+    file::replace(
+        &folder.join("index.html"),
+        &html::document(TITLE, &body).into_string(),
+    )
 }
 
 fn table(judgements: &[Judgement]) -> Markup {
@@ -78,8 +81,8 @@ fn piece(folder: &Path, product: &Product) -> anyhow::Result<Markup> {
     let mut drawings = Vec::new();
     for (name, caption) in &product.figures {
         let path = folder.join(format!("figures/{name}.svg"));
-        let svg = fs::read_to_string(&path)
-            .with_context(|| format!("cannot read {}", path.display()))?;
+        let svg =
+            fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
         drawings.push((name, caption, svg));
     }
     Ok(html! {

@@ -96,11 +96,31 @@ pub fn all(options: &Options) -> Vec<Piece> {
                 make,
             });
         };
-        piece("speed", "Figures 6 and 7: sweep over the speed", sweeps::speed);
-        piece("square", "Figure 8: sweep over the square dither's amplitude", sweeps::square);
-        piece("sine", "Figure 13: sweep over the sine dither's amplitude", sweeps::sine);
-        piece("suppression", "Figures 12 and 17: chaos suppressed", figures::suppression);
-        piece("averaging", "Averaging against the true signal", figures::averaging);
+        piece(
+            "speed",
+            "Figures 6 and 7: sweep over the speed",
+            sweeps::speed,
+        );
+        piece(
+            "square",
+            "Figure 8: sweep over the square dither's amplitude",
+            sweeps::square,
+        );
+        piece(
+            "sine",
+            "Figure 13: sweep over the sine dither's amplitude",
+            sweeps::sine,
+        );
+        piece(
+            "suppression",
+            "Figures 12 and 17: chaos suppressed",
+            figures::suppression,
+        );
+        piece(
+            "averaging",
+            "Averaging against the true signal",
+            figures::averaging,
+        );
         piece("errata", "What the print gets wrong", errata::errata);
     }
     pieces

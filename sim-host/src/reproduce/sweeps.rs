@@ -27,7 +27,14 @@ pub fn speed(named: &Named, quality: Quality, watch: Watch) -> Made {
         Quality::Full => (2.0, 0.5),
     };
     let values = Values::new("wheel speed", 1500.0, 2000.0, step)?;
-    let sweep = sweep(&named.scenario, Parameter::Speed, &values, width, quality, watch)?;
+    let sweep = sweep(
+        &named.scenario,
+        Parameter::Speed,
+        &values,
+        width,
+        quality,
+        watch,
+    )?;
     let (from, to) = (1500.0, 2000.0);
     let [a, b, c] = REGION_EDGES_RPM;
     let edges = [("I", from, a), ("II", a, b), ("III", b, c), ("IV", c, to)];
@@ -105,7 +112,14 @@ fn amplitude(
         Quality::Full => (140.0, 0.5e-3),
     };
     let values = Values::new("dither amplitude", 0.0, greatest_v, greatest_v / points)?;
-    let sweep = sweep(&scenario, Parameter::Amplitude, &values, width, quality, watch)?;
+    let sweep = sweep(
+        &scenario,
+        Parameter::Amplitude,
+        &values,
+        width,
+        quality,
+        watch,
+    )?;
     let word = match waveform {
         Waveform::Square => "square",
         _ => "sine",
@@ -147,7 +161,10 @@ fn exponent_chart(sweep: &Regions, shaded: &[Region]) -> Chart {
         let point = |sample: &crate::chaos::regions::Sample| {
             let attractor = &sample.attractor;
             let exponent = attractor.exponent_per_s?;
-            Some((sample.value, value(exponent, attractor.exponent_threshold_per_s?)))
+            Some((
+                sample.value,
+                value(exponent, attractor.exponent_threshold_per_s?),
+            ))
         };
         sweep.samples.iter().filter_map(point).collect::<Vec<_>>()
     };
