@@ -44,14 +44,15 @@ pub fn of_speeds(preset: &str, sweep: &Regions) -> Vec<Judgement> {
         let edges: Vec<_> = [from, to]
             .into_iter()
             .filter(|edge| REGION_EDGES_RPM.contains(edge))
-            .map(|edge| (edge, nearest_edge(sweep, edge, kind)))
+            .map(|edge| (edge, nearest_edge_of_chaos(sweep, edge)))
             .collect();
         let near = |(claimed, found): &(f64, Option<(f64, f64)>)| {
             found.is_some_and(|(middle, _)| (middle - claimed).abs() <= EDGE_SHARE * claimed)
         };
-        let verdict = if share >= MOST && edges.iter().all(near) {
+        let edges_hold = edges.iter().all(near);
+        let verdict = if share >= MOST && edges_hold {
             Reproduced::Yes
-        } else if share >= SOME {
+        } else if share >= SOME || (edges_hold && share > 0.0) {
             Reproduced::InPart
         } else {
             Reproduced::No
@@ -60,8 +61,8 @@ pub fn of_speeds(preset: &str, sweep: &Regions) -> Vec<Judgement> {
             claim: claim.into(),
             preset: preset.into(),
             measured: format!(
-                "{kind} in {:.0} % of {from:.0} to {to:.0} rpm{}",
-                100.0 * share,
+                "{} of {from:.0} to {to:.0} rpm{}",
+                composition(sweep, from, to),
                 exponents(sweep, from, to, kind)
             ),
             distance: edges
@@ -92,7 +93,12 @@ pub fn of_square_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
         Judgement {
             claim: "C5".into(),
             preset: preset.into(),
-            measured: format!("{} at 0 V, {} at 0.14 V", name(start), name(end)),
+            measured: format!(
+                "{} at 0 V, {} at 0.14 V; on the way {}",
+                name(start),
+                name(end),
+                composition(sweep, 0.0, 0.14)
+            ),
             distance: last_chaos.map_or_else(String::new, |edge| {
                 format!(
                     "chaos ends at {:.4} \u{b1} {:.4} V",
@@ -195,24 +201,43 @@ fn share(sweep: &Regions, from: f64, to: f64, wanted: impl Fn(Kind) -> bool) -> 
     held.map(overlap).sum::<f64>() / (to - from)
 }
 
-/// Middle and half width of the edge of a region of the given kind that is nearest to `claimed`.
-fn nearest_edge(sweep: &Regions, claimed: f64, kind: Kind) -> Option<(f64, f64)> {
-    let of_kind = sweep
+/// The kinds in a range with their shares, the greatest first; shares under 1 % are left out.
+fn composition(sweep: &Regions, from: f64, to: f64) -> String {
+    let mut shares: Vec<(String, f64)> = Vec::new();
+    for region in &sweep.regions {
+        let share = (region.to.min(to) - region.from.max(from)).max(0.0) / (to - from);
+        let name = region.kind.to_string();
+        match shares.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, sum)) => *sum += share,
+            None => shares.push((name, share)),
+        }
+    }
+    shares.retain(|&(_, share)| share >= 0.01);
+    shares.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let words = shares
+        .iter()
+        .map(|(name, share)| format!("{name} in {:.0} %", 100.0 * share));
+    words.collect::<Vec<_>>().join(", ")
+}
+
+/// Middle and half width of the edge between chaos and anything else that is nearest to `claimed`.
+fn nearest_edge_of_chaos(sweep: &Regions, claimed: f64) -> Option<(f64, f64)> {
+    let of_chaos = sweep
         .edges
         .iter()
-        .filter(|edge| edge.below == kind || edge.above == kind);
+        .filter(|edge| (edge.below == Kind::Chaos) != (edge.above == Kind::Chaos));
     let apart = |edge: &&crate::chaos::regions::Edge| (edge.middle() - claimed).abs();
-    let nearest = of_kind.min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    let nearest = of_chaos.min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
     Some((nearest.middle(), 0.5 * (nearest.upper - nearest.lower)))
 }
 
 fn edge_distance((claimed, found): &(f64, Option<(f64, f64)>)) -> String {
     match found {
         Some((middle, half)) => format!(
-            "edge at {middle:.1} \u{b1} {half:.1} rpm, {:+.1} from {claimed:.0}",
+            "chaos' edge at {middle:.1} \u{b1} {half:.1} rpm, {:+.1} from {claimed:.0}",
             middle - claimed
         ),
-        None => format!("no edge near {claimed:.0}"),
+        None => format!("no edge of chaos near {claimed:.0}"),
     }
 }
 
