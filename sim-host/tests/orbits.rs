@@ -8,9 +8,21 @@ fn explore() {
     for (tr, time) in [(200.0, 600.0)] {
         let t = std::time::Instant::now();
         let values = Values::new("", 1600.0, 1900.0, 5.0).unwrap();
-        let r = regions(&Scenario::reconstruction(), Parameter::Speed, &values, 0.5, Timing::new(tr, time).unwrap(), Watch{stop:&stop, done:&||{}}).unwrap();
+        let r = regions(
+            &Scenario::reconstruction(),
+            Parameter::Speed,
+            &values,
+            0.5,
+            Timing::new(tr, time).unwrap(),
+            Watch {
+                stop: &stop,
+                done: &|| {},
+            },
+        )
+        .unwrap();
         println!("{time} {:?}, {} samples", t.elapsed(), r.samples.len());
-        for e in &r.regions { println!("{:.2} {:.2} {}", e.from, e.to, e.kind); }
-
+        for e in &r.regions {
+            println!("{:.2} {:.2} {}", e.from, e.to, e.kind);
+        }
     }
 }

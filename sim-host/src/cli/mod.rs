@@ -1,12 +1,17 @@
 //! One file a subcommand, and what they share: exit codes, configuration options, output files.
 
 mod averaging;
+mod basin;
 mod config;
 mod convergence;
 mod decode;
+mod equilibria;
+mod orbit;
 mod output;
 mod qemu;
+mod regions;
 mod simulate;
+mod sweep;
 mod verify;
 
 use clap::{Args, Parser, Subcommand};
@@ -41,6 +46,10 @@ enum Command {
     Simulate(simulate::Arguments),
     Averaging(averaging::Arguments),
     Convergence(convergence::Arguments),
+    Orbit(orbit::Arguments),
+    Regions(regions::Arguments),
+    Equilibria(equilibria::Arguments),
+    Basin(basin::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
     Qemu(qemu::Arguments),
@@ -73,6 +82,10 @@ pub fn main() -> ExitCode {
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Averaging(arguments) => averaging::run(&arguments),
         Command::Convergence(arguments) => convergence::run(&arguments),
+        Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Regions(arguments) => regions::run(&arguments),
+        Command::Equilibria(arguments) => equilibria::run(&arguments),
+        Command::Basin(arguments) => basin::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),
