@@ -239,6 +239,13 @@ impl<T: Real> SineMean<T> {
         }
     }
 
+    /// The same quadrature in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> SineMean<U> {
+        SineMean {
+            nodes: self.nodes.map(f),
+        }
+    }
+
     /// Mean of `f(y + amplitude sin(theta))` over a period of theta.
     ///
     /// ```

@@ -125,6 +125,14 @@ impl<T: Real> CubicTire<T> {
         alpha * (self.linear_n_per_rad - self.cubic_n_per_rad3 * alpha * alpha)
     }
 
+    /// The same coefficients in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> CubicTire<U> {
+        CubicTire {
+            linear_n_per_rad: f(self.linear_n_per_rad),
+            cubic_n_per_rad3: f(self.cubic_n_per_rad3),
+        }
+    }
+
     /// The tyre that a dithered slip angle meets on average. The mean of the cube under a zero-mean dither of mean square
     /// W^2 (square) or W^2/2 (sine) adds 3 k2 alpha times that to the linear term, so the mean is a cubic tyre again:
     /// (21) gives k1 - 3 k2 W^2, (23) gives k1 - 1.5 k2 W^2.
@@ -171,6 +179,14 @@ impl<T: Real> Tire<T> {
         match model {
             TireModel::Cubic => Self::Cubic(coefficients.cubic()),
             TireModel::MagicFormula => Self::MagicFormula(*coefficients, SineMean::new()),
+        }
+    }
+
+    /// The same tyre in another arithmetic.
+    pub fn map<U: Real>(&self, f: &impl Fn(T) -> U) -> Tire<U> {
+        match self {
+            Self::Cubic(tire) => Tire::Cubic(tire.map(f)),
+            Self::MagicFormula(tire, mean) => Tire::MagicFormula(tire.map(f), mean.map(f)),
         }
     }
 

@@ -172,6 +172,27 @@ impl<T: Real> Model<T> {
         }
     }
 
+    /// The same right-hand side in another arithmetic.
+    pub fn map<U: Real>(&self, f: &impl Fn(T) -> U) -> Model<U> {
+        Model {
+            slip_form: self.slip_form,
+            front: self.front.map(f),
+            rear: self.rear.map(f),
+            front_lever_s: f(self.front_lever_s),
+            rear_lever_s: f(self.rear_lever_s),
+            lateral_gain: f(self.lateral_gain),
+            front_yaw_gain: f(self.front_yaw_gain),
+            rear_yaw_gain: f(self.rear_yaw_gain),
+            motor_torque_nm: f(self.motor_torque_nm),
+            trail_m: f(self.trail_m),
+            damping_nm_s_per_rad: f(self.damping_nm_s_per_rad),
+            inverse_steering_inertia: f(self.inverse_steering_inertia),
+            friction: self.friction.map(f),
+            friction_limit_nm: f(self.friction_limit_nm),
+            dither_frequency_rad_per_s: f(self.dither_frequency_rad_per_s),
+        }
+    }
+
     /// The state in which a run of the scenario starts.
     pub fn initial_state(&self, scenario: &Scenario<T>) -> State<T> {
         let run = &scenario.run;

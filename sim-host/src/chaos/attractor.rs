@@ -33,14 +33,20 @@ pub enum Kind {
     /// The maxima of the yaw rate repeat after this many, and the exponent is not positive.
     Periodic(usize),
     /// The maxima do not repeat, and the exponent is positive.
-    Chaos {
-        /// The maxima visit this many separate bands in turn: a diagram shows narrow ones much as it shows a period.
-        bands: usize,
-    },
+    Chaos,
+    /// Chaos whose maxima visit this many separate bands in turn: a diagram shows narrow ones much as it shows a period.
+    BandedChaos(usize),
     /// Maxima and exponent disagree, or the run is too short for one of them.
     Undecided,
     /// The motion leaves all bounds.
     Diverges,
+}
+
+impl Kind {
+    /// Chaos, in however many bands.
+    pub fn is_chaotic(self) -> bool {
+        matches!(self, Self::Chaos | Self::BandedChaos(_))
+    }
 }
 
 impl std::fmt::Display for Kind {
@@ -48,8 +54,8 @@ impl std::fmt::Display for Kind {
         match self {
             Self::Equilibrium => f.write_str("equilibrium"),
             Self::Periodic(maxima) => write!(f, "period-{maxima}"),
-            Self::Chaos { bands: 1 } => f.write_str("chaos"),
-            Self::Chaos { bands } => write!(f, "{bands}-band chaos"),
+            Self::Chaos => f.write_str("chaos"),
+            Self::BandedChaos(bands) => write!(f, "{bands}-band chaos"),
             Self::Undecided => f.write_str("undecided"),
             Self::Diverges => f.write_str("diverges"),
         }
@@ -127,7 +133,7 @@ impl Attractor {
                 return apart.fold(0.0, f64::max) < SAME_REST || equilibria.iter().any(both);
             }
             Kind::Periodic(_) => COMMON_PERIODIC,
-            Kind::Chaos { .. } | Kind::Undecided => COMMON_CHAOTIC,
+            Kind::Chaos | Kind::BandedChaos(_) | Kind::Undecided => COMMON_CHAOTIC,
         };
         (0..4).all(|k| {
             let joint = self.upper[k].max(other.upper[k]) - self.lower[k].min(other.lower[k]);
@@ -213,8 +219,9 @@ fn kind(
         Period::Periodic { maxima, .. } if positive == Some(false) || !with_exponent => {
             Kind::Periodic(maxima)
         }
-        Period::Aperiodic { .. } if positive == Some(true) => Kind::Chaos {
-            bands: bands(maxima),
+        Period::Aperiodic { .. } if positive == Some(true) => match bands(maxima) {
+            1 => Kind::Chaos,
+            bands => Kind::BandedChaos(bands),
         },
         _ => Kind::Undecided,
     }

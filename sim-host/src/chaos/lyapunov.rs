@@ -1,13 +1,15 @@
-//! Largest Lyapunov exponent by tangent dynamics.
+//! Lyapunov exponents by tangent dynamics.
 //!
-//! A tangent vector is carried along a motion by the linearised step (dual numbers through the ECU's own program, so with
-//! the right jumps at friction events; stick takes one dimension away), and the mean rate of its growth is the exponent.
-//! The motion may be any recorded one: the firmware's own telemetry will do.
+//! A tangent vector is carried along a motion by the linearised step (dual numbers through the integrator itself, so with
+//! the right jumps at friction events; stick takes one dimension away), and the mean rate of its growth is the largest
+//! exponent. [`largest`] takes any recorded motion: the firmware's own telemetry will do. [`exponents`] runs freely along a
+//! [`Flow`] with as many vectors as exponents are wanted, kept at right angles.
 
+use crate::chaos::flow::{Flow, Unmeasured, check, steps};
 use crate::chaos::period::yaw_rate_maxima;
 use crate::engine::dual::Dual;
 use crate::trace::Trace;
-use nalgebra::Vector4;
+use nalgebra::{SMatrix, SVector, Vector4};
 use shared_model::Scenario;
 use shared_model::controller::Ecu;
 use shared_model::vehicle::State;
@@ -16,17 +18,22 @@ use shared_model::vehicle::State;
 const MIN_PIECES: usize = 16;
 /// Where the yaw rate has no maxima (at rest), pieces of equal time.
 const PIECES_AT_REST: usize = 64;
+/// Pieces of equal time that a free-running motion is cut into.
+const PIECES: usize = 128;
+/// A tangent vector is lost when orthogonalisation leaves less than this share of it: rounding leaves 1e-16 of a vector that has
+/// no direction of its own, contraction within one step leaves far more.
+const LOST: f64 = 1e-12;
 /// Correlation of neighbours up to which a sequence is prewhitened.
 const GREATEST_CORRELATION: f64 = 0.97;
 /// Time in which the tangent vector turns into the direction of fastest growth, as a share of the motion.
-const WARM_UP: f64 = 0.1;
+pub(crate) const WARM_UP: f64 = 0.1;
 
 /// A Lyapunov exponent with its statistical error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Exponent {
     /// Mean growth rate, 1/s.
     pub per_s: f64,
-    /// Standard error, 1/s; see [`largest`].
+    /// Standard error, 1/s; it takes the correlation of successive pieces of the motion into account.
     pub standard_error_per_s: f64,
     /// The least rate that the motion's length can tell from zero, 1/s: the most that the vector stretches beyond the mean
     /// within one cycle, and at least one e-fold, over the whole length.
@@ -37,7 +44,7 @@ pub struct Exponent {
 
 impl Exponent {
     /// The exponent from growths (of the logarithm) and lengths (s) of successive pieces.
-    fn from_pieces(pieces: &[(f64, f64)]) -> Self {
+    pub(crate) fn from_pieces(pieces: &[(f64, f64)]) -> Self {
         let duration_s: f64 = pieces.iter().map(|&(_, length)| length).sum();
         let mean = pieces.iter().map(|&(growth, _)| growth).sum::<f64>() / duration_s;
         let excess: Vec<f64> = pieces
@@ -146,4 +153,103 @@ fn piece_ends(trace: &Trace, from: usize) -> Vec<usize> {
     }
     let index = |&(time_s, _): &(f64, f64)| (time_s / trace.step_s).round() as usize - 1;
     maxima.iter().map(index).collect()
+}
+
+/// K exponents of a free-running motion, in descending order. `None` stands for minus infinity.
+pub type Spectrum<const K: usize> = [Option<Exponent>; K];
+
+/// The K largest Lyapunov exponents of the motion from `start` over `time_s`; K = 1 gives the largest, K = N the spectrum.
+///
+/// K tangent vectors go along in dual numbers and are brought back to right angles and length one behind every step
+/// (Gram-Schmidt, modified); the logarithms of the lengths that this takes away add up to the exponents. G. Benettin,
+/// L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21; I. Shimada, T. Nagashima, Progress of Theoretical
+/// Physics 61 (1979) 1605. The first tenth of the time is not counted: the vectors turn into their directions.
+///
+/// Where the steering sticks, the linearised step maps all vectors into the hyperplane of steering rate zero and one of them
+/// has no length left. That is exact: the volume of the frame is zero from then on, and the last exponent is minus infinity
+/// (`None`). The vector stays zero. The others do not depend on it, so nothing is seeded anew and all time counts for them.
+///
+/// # Errors
+/// If the motion diverges, or is too short.
+pub fn exponents<const N: usize, const K: usize>(
+    flow: &impl Flow<N>,
+    start: &SVector<f64, N>,
+    time_s: f64,
+) -> Result<Spectrum<K>, Unmeasured> {
+    let mut x = *start;
+    // Linearly independent, and none along an axis, which may be invariant.
+    let mut frame = SMatrix::<f64, N, K>::from_element(0.5) + SMatrix::<f64, N, K>::identity();
+    orthonormalise(&mut frame);
+    let mut done = 0;
+    over_pieces(flow, time_s, |steps| {
+        let mut growth = [0.0; K];
+        for _ in 0..steps {
+            let dual = SVector::<Dual<K>, N>::from_fn(|i, _| {
+                Dual::new(x[i], std::array::from_fn(|k| frame[(i, k)]))
+            });
+            let next = flow.step(&dual);
+            x = next.map(|component| component.value);
+            frame = SMatrix::from_fn(|i, k| next[i].tangent[k]);
+            let lengths = orthonormalise(&mut frame);
+            for (growth, length) in growth.iter_mut().zip(lengths) {
+                *growth += length.ln();
+            }
+        }
+        done += steps;
+        check(flow, &x, done)?;
+        Ok(growth)
+    })
+}
+
+/// Brings the columns to right angles and length one; what their lengths were. A column without a direction of its own becomes
+/// zero.
+fn orthonormalise<const N: usize, const K: usize>(frame: &mut SMatrix<f64, N, K>) -> [f64; K] {
+    let length = |v: &SVector<f64, N>| v.dot(v).sqrt();
+    std::array::from_fn(|k| {
+        let mut column: SVector<f64, N> = frame.column(k).into_owned();
+        let before = length(&column);
+        for earlier in 0..k {
+            let direction = frame.column(earlier).into_owned();
+            column -= direction * direction.dot(&column);
+        }
+        let after = length(&column);
+        let lost = after <= LOST * before;
+        frame.set_column(
+            k,
+            &if lost {
+                SVector::zeros()
+            } else {
+                column / after
+            },
+        );
+        if lost { 0.0 } else { after }
+    })
+}
+
+/// K exponents from the growth of logarithms over successive pieces of equal time. `growth` goes on by the given number of
+/// steps; minus infinity stands for a length that has become zero.
+pub(crate) fn over_pieces<const N: usize, const K: usize>(
+    flow: &impl Flow<N>,
+    time_s: f64,
+    mut growth: impl FnMut(usize) -> Result<[f64; K], Unmeasured>,
+) -> Result<Spectrum<K>, Unmeasured> {
+    let steps = steps(flow, time_s);
+    let warm_up = (steps as f64 * WARM_UP).ceil() as usize;
+    let piece = (steps - warm_up.min(steps)) / PIECES;
+    if piece == 0 {
+        let least_s = (PIECES as f64 / (1.0 - WARM_UP)).ceil() * flow.step_s();
+        return Err(Unmeasured::TooShort { time_s, least_s });
+    }
+    growth(warm_up)?;
+    let length_s = piece as f64 * flow.step_s();
+    let mut pieces = [const { Vec::new() }; K];
+    for _ in 0..PIECES {
+        for (pieces, growth) in pieces.iter_mut().zip(growth(piece)?) {
+            pieces.push((growth, length_s));
+        }
+    }
+    Ok(pieces.map(|pieces| {
+        let finite = pieces.iter().all(|&(growth, _)| growth.is_finite());
+        finite.then(|| Exponent::from_pieces(&pieces))
+    }))
 }

@@ -1,12 +1,27 @@
-//! Measures of chaos: the largest Lyapunov exponent, the period, attractors and what becomes of them along a parameter.
+//! Measures of chaos: Lyapunov exponents by three independent methods, the period, attractors, and what becomes of them along a
+//! parameter.
+//!
+//! | question | module |
+//! |---|---|
+//! | what is a motion to the methods? | [`flow`] |
+//! | exponents by tangent dynamics, the largest one or all | [`lyapunov`] |
+//! | the largest exponent by two neighbouring motions | [`twin`] |
+//! | the largest exponent by synchronisation, the paper's method | [`synchronisation`] |
+//! | which period has a motion? | [`period`], [`extrema`] |
+//! | what does a motion end on? | [`attractor`], [`basin`] |
+//! | what becomes of it along a parameter? | [`orbit`], [`regions`], [`sweep`] |
+//! | where can it rest, and is that stable? | [`equilibria`], [`polynomial`] |
 
 pub mod attractor;
 pub mod basin;
 pub mod equilibria;
 pub mod extrema;
+pub mod flow;
 pub mod lyapunov;
 pub mod orbit;
 pub mod period;
 pub mod polynomial;
 pub mod regions;
 pub mod sweep;
+pub mod synchronisation;
+pub mod twin;

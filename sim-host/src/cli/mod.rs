@@ -10,6 +10,7 @@ mod orbit;
 mod output;
 mod qemu;
 mod regions;
+mod reproduce;
 mod simulate;
 mod sweep;
 mod verify;
@@ -44,6 +45,7 @@ struct Cli {
 enum Command {
     Verify(verify::Arguments),
     Simulate(simulate::Arguments),
+    Reproduce(reproduce::Arguments),
     Averaging(averaging::Arguments),
     Convergence(convergence::Arguments),
     Orbit(orbit::Arguments),
@@ -80,6 +82,7 @@ pub fn main() -> ExitCode {
     let done = match command {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Reproduce(arguments) => reproduce::run(&arguments),
         Command::Averaging(arguments) => averaging::run(&arguments),
         Command::Convergence(arguments) => convergence::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
