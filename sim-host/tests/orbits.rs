@@ -1,40 +1,241 @@
-//! Regions and orbit diagrams.
+//! Regions, orbit diagrams and basins of the paper's vehicle against the paper and against each other.
+
 use shared_model::Scenario;
-use sim_host::chaos::regions::*;
-use sim_host::chaos::sweep::*;
+use shared_model::dither::Waveform;
+use sim_host::chaos::attractor::{Kind, attractor};
+use sim_host::chaos::basin::basin;
+use sim_host::chaos::equilibria;
+use sim_host::chaos::extrema::Extrema;
+use sim_host::chaos::orbit::{Component, Outcome, Point, Section, Start, diagram};
+use sim_host::chaos::period::yaw_rate_maxima;
+use sim_host::chaos::regions::{Regions, coexisting, regions};
+use sim_host::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, mirrored};
+use sim_host::simulate::simulate;
+use std::sync::atomic::AtomicBool;
+
+static GO_ON: AtomicBool = AtomicBool::new(false);
+const WATCH: Watch = Watch {
+    stop: &GO_ON,
+    done: &|| {},
+};
+
+fn at(rpm: f64) -> Scenario<f64> {
+    Parameter::Speed.set(&Scenario::reconstruction(), rpm)
+}
+
+fn values(from: f64, to: f64, step: f64) -> Values {
+    Values::new("test", from, to, step).expect("the range is valid")
+}
+
+fn timing(transient_s: f64, time_s: f64) -> Timing {
+    Timing::new(transient_s, time_s).expect("the times are valid")
+}
+
+fn over_speed(from: f64, to: f64, step: f64) -> Regions {
+    regions(
+        &Scenario::reconstruction(),
+        Parameter::Speed,
+        &values(from, to, step),
+        0.5,
+        timing(200.0, 600.0),
+        WATCH,
+    )
+    .expect("the sweep is valid")
+}
+
 #[test]
-fn explore() {
-    let stop = std::sync::atomic::AtomicBool::new(false);
-    for (tr, time) in [(200.0, 600.0), (1000.0, 2000.0)] {
-        let t = std::time::Instant::now();
-        let values = Values::new("", 1600.0, 1900.0, 5.0).unwrap();
-        let r = regions(
-            &Scenario::reconstruction(),
-            Parameter::Speed,
-            &values,
-            0.5,
-            Timing::new(tr, time).unwrap(),
-            Watch {
-                stop: &stop,
-                done: &|| {},
-            },
-        )
-        .unwrap();
-        println!("{time} {:?}, {} samples", t.elapsed(), r.samples.len());
-        for e in &r.regions {
-            println!("{:.2} {:.2} {}", e.from, e.to, e.kind);
-        }
-        for e in &r.samples {
-            if e.value > 1815.0 && e.value < 1865.0 {
-                println!(
-                    "   {} {} {:?} {:?} {:?}",
-                    e.value,
-                    e.attractor.kind,
-                    e.attractor.residual,
-                    e.attractor.exponent_per_s,
-                    e.attractor.exponent_threshold_per_s
-                );
-            }
+fn the_papers_four_speeds() {
+    for (rpm, kind) in [
+        (1600.0, Kind::Periodic(2)),
+        (1750.0, Kind::Chaos),
+        (1845.0, Kind::Periodic(3)),
+        (1880.0, Kind::Chaos),
+    ] {
+        let found = attractor(&at(rpm), timing(200.0, 600.0), true).expect("valid");
+        assert_eq!(found.kind, kind, "{rpm} rpm: {found:?}");
+        assert_eq!(found.lobe(), "positive", "{rpm} rpm");
+    }
+}
+
+/// Chaos begins within 7 rpm of the paper's 1645. At its 1825 the chaos splits into three bands, out of which period 3
+/// comes, and that ends at its 1855.
+#[test]
+fn edges_are_near_the_papers() {
+    let sweep = over_speed(1620.0, 1890.0, 15.0);
+    assert!(sweep.complete);
+    for edge in &sweep.edges {
+        assert!(edge.upper - edge.lower <= 0.5, "{edge:?}");
+    }
+    let first_above = |rpm: f64, is: fn(Kind) -> bool| {
+        let mut edges = sweep.edges.iter().filter(|e| e.lower >= rpm);
+        edges
+            .find(|e| is(e.above))
+            .unwrap_or_else(|| panic!("{:?}", sweep.edges))
+            .middle()
+    };
+    let chaos = first_above(1600.0, Kind::is_chaotic);
+    let bands = first_above(1800.0, |kind| kind == Kind::BandedChaos(3));
+    let again = first_above(1846.0, Kind::is_chaotic);
+    for (found, paper) in [(chaos, 1645.0), (bands, 1825.0), (again, 1855.0)] {
+        assert!((found - paper).abs() <= 7.0, "{found} rpm, paper {paper}");
+    }
+}
+
+#[test]
+fn dither_makes_period_one_where_the_paper_has_it() {
+    for (waveform, from, to, step) in [
+        (Waveform::Square, 0.1, 0.1, 1.0),
+        (Waveform::Sine, 0.8, 1.2, 0.1),
+    ] {
+        let mut scenario = at(1750.0);
+        scenario.dither.waveform = waveform;
+        let range = values(from, to, step);
+        let timing = timing(200.0, 600.0);
+        let sweep = regions(&scenario, Parameter::Amplitude, &range, 5e-4, timing, WATCH)
+            .expect("the sweep is valid");
+        assert_eq!(sweep.samples.len(), range.count());
+        for sample in &sweep.samples {
+            let kind = sample.attractor.kind;
+            assert_eq!(kind, Kind::Periodic(1), "{waveform:?}, {} V", sample.value);
         }
     }
+}
+
+#[test]
+fn the_other_lobe_has_an_equilibrium_of_its_own() {
+    let range = values(1600.0, 1640.0, 20.0);
+    let (given, timing) = (at(1600.0), timing(200.0, 600.0));
+    let sweep = |scenario| {
+        regions(&scenario, Parameter::Speed, &range, 0.5, timing, WATCH)
+            .expect("the sweep is valid")
+    };
+    let (one, other) = (sweep(given), sweep(mirrored(&given)));
+    for sample in &other.samples {
+        assert_eq!(sample.attractor.kind, Kind::Equilibrium);
+        assert_eq!(sample.attractor.lobe(), "negative");
+    }
+    let both = coexisting(&given, Parameter::Speed, &one, &other).expect("valid");
+    assert_eq!(both, [1600.0, 1620.0, 1640.0]);
+    assert!(
+        coexisting(&given, Parameter::Speed, &one, &one)
+            .expect("valid")
+            .is_empty()
+    );
+}
+
+fn orbit(scenario: &Scenario<f64>, range: &Values, section: Section, start: Start) -> Vec<Point> {
+    let timing = timing(100.0, 200.0);
+    diagram(
+        scenario,
+        Parameter::Speed,
+        range,
+        section,
+        timing,
+        start,
+        WATCH,
+    )
+    .expect("the diagram is valid")
+}
+
+fn heights(point: &Point) -> &[f64] {
+    match &point.orbit {
+        Outcome::Meets { values } => values,
+        other => panic!("{} rpm: {other:?}", point.value),
+    }
+}
+
+/// Where there is one attractor on the lobe, every start shows it.
+#[test]
+fn continuation_upwards_and_downwards_agree_on_a_period() {
+    let range = values(1580.0, 1620.0, 10.0);
+    let all = [Start::Fixed, Start::Up, Start::Down]
+        .map(|start| orbit(&at(1600.0), &range, Section::YawRateMaxima, start));
+    for (k, fixed) in all[0].iter().enumerate() {
+        for other in &all[1..] {
+            assert_eq!(fixed.value, other[k].value);
+            let extent = |p| {
+                let bound = |pick: fn(f64, f64) -> f64| heights(p).iter().copied().reduce(pick);
+                (bound(f64::min).expect("some"), bound(f64::max).expect("some"))
+            };
+            let (a, b) = (extent(fixed), extent(&other[k]));
+            assert!((a.0 - b.0).abs() < 1e-3 && (a.1 - b.1).abs() < 1e-3, "{a:?} {b:?}");
+        }
+    }
+}
+
+/// A section in the steering rate: a period-2 orbit, which steers once to and fro for each maximum, meets it in few points;
+/// one far out is never crossed, and the message says where the motion stays.
+#[test]
+fn sections_are_crossed_or_said_not_to_be() {
+    let range = values(1600.0, 1600.0, 1.0);
+    let section = |level| Section::Rising {
+        component: Component::SteeringAngle,
+        level,
+    };
+    let points = orbit(&at(1600.0), &range, section(0.3), Start::Fixed);
+    let mut met = heights(&points[0]).to_vec();
+    met.sort_by(f64::total_cmp);
+    met.dedup_by(|a, b| (*a - *b).abs() < 1e-3);
+    assert!((1..=4).contains(&met.len()), "{met:?}");
+    let refused = diagram(
+        &at(1600.0),
+        Parameter::Speed,
+        &range,
+        section(2.0),
+        timing(100.0, 200.0),
+        Start::Fixed,
+        WATCH,
+    );
+    let Err(SweepError::SectionNotCrossed { low, high, .. }) = refused else {
+        panic!("{refused:?}");
+    };
+    assert!(low < high && high < 2.0, "{low} to {high}");
+}
+
+/// Maxima found while the motion runs are those of the recorded motion.
+#[test]
+fn streaming_finds_the_recorded_maxima() {
+    for rpm in [1600.0, 1750.0] {
+        let mut scenario = at(rpm);
+        scenario.run.duration_s = 100.0;
+        let trace = simulate(&scenario).expect("valid");
+        let mut extrema = Extrema::default();
+        for (k, gamma) in trace.component(1).enumerate() {
+            extrema.push(trace.time_s(k), trace.step_s, gamma);
+        }
+        let (found, recorded) = (extrema.maxima(), yaw_rate_maxima(&trace, 0));
+        assert!(recorded.len() > 50);
+        assert_eq!(found.len(), recorded.len());
+        for (a, b) in found.iter().zip(&recorded) {
+            let apart = (a.0 - b.0).abs().max((a.1 - b.1).abs());
+            assert!(apart < 1e-9, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn starts_end_on_the_attractors_of_both_lobes_or_diverge() {
+    let scenario = at(1600.0);
+    let (betas, deltas) = (values(-0.15, 0.15, 0.15), values(-0.46, 0.46, 0.46));
+    let found = basin(&scenario, &betas, &deltas, timing(200.0, 400.0), WATCH).expect("valid");
+    assert_eq!(found.cells.len(), 9);
+    let of = |beta: f64, delta: f64| {
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        let cell = found
+            .cells
+            .iter()
+            .find(|c| near(c.sideslip_rad, beta) && near(c.steering_angle_rad, delta));
+        &found.attractors[cell.expect("the start is on the grid").attractor]
+    };
+    assert_eq!(of(0.15, 0.46).kind, Kind::Periodic(2));
+    let rest = of(-0.15, -0.46);
+    assert_eq!(rest.kind, Kind::Equilibrium);
+    // It rests in the stick band of one of the equilibria.
+    let equilibria = equilibria::find(&scenario).expect("valid");
+    let holding = equilibria.iter().filter(|e| e.holds(&rest.end)).count();
+    assert_eq!(holding, 1, "{rest:?}");
+    // Far out the cubic tyre pushes the vehicle away.
+    let (far, one) = (values(5.0, 5.0, 1.0), values(0.0, 0.0, 1.0));
+    let away = basin(&scenario, &far, &one, timing(200.0, 400.0), WATCH).expect("valid");
+    assert_eq!(away.attractors[0].kind, Kind::Diverges);
 }

@@ -17,6 +17,10 @@ const LONGEST_EXPONENT_S: f64 = 1000.0;
 const COMMON_PERIODIC: f64 = 0.97;
 /// The same for chaotic motions, whose extents are those of a finite time.
 const COMMON_CHAOTIC: f64 = 0.8;
+/// Most bands that are counted.
+const MAX_BANDS: usize = 6;
+/// Fewest maxima that tell a band's extent.
+const MAXIMA_PER_BAND: usize = 20;
 /// Distance within which two states of rest are the same, in each component (rad and rad/s).
 const SAME_REST: f64 = 1e-4;
 
@@ -30,10 +34,19 @@ pub enum Kind {
     Periodic(usize),
     /// The maxima do not repeat, and the exponent is positive.
     Chaos,
+    /// Chaos whose maxima visit this many separate bands in turn: a diagram shows narrow ones much as it shows a period.
+    BandedChaos(usize),
     /// Maxima and exponent disagree, or the run is too short for one of them.
     Undecided,
     /// The motion leaves all bounds.
     Diverges,
+}
+
+impl Kind {
+    /// Chaos, in however many bands.
+    pub fn is_chaotic(self) -> bool {
+        matches!(self, Self::Chaos | Self::BandedChaos(_))
+    }
 }
 
 impl std::fmt::Display for Kind {
@@ -42,6 +55,7 @@ impl std::fmt::Display for Kind {
             Self::Equilibrium => f.write_str("equilibrium"),
             Self::Periodic(maxima) => write!(f, "period-{maxima}"),
             Self::Chaos => f.write_str("chaos"),
+            Self::BandedChaos(bands) => write!(f, "{bands}-band chaos"),
             Self::Undecided => f.write_str("undecided"),
             Self::Diverges => f.write_str("diverges"),
         }
@@ -119,7 +133,7 @@ impl Attractor {
                 return apart.fold(0.0, f64::max) < SAME_REST || equilibria.iter().any(both);
             }
             Kind::Periodic(_) => COMMON_PERIODIC,
-            Kind::Chaos | Kind::Undecided => COMMON_CHAOTIC,
+            Kind::Chaos | Kind::BandedChaos(_) | Kind::Undecided => COMMON_CHAOTIC,
         };
         (0..4).all(|k| {
             let joint = self.upper[k].max(other.upper[k]) - self.lower[k].min(other.lower[k]);
@@ -179,7 +193,7 @@ pub fn attractor(
     let mut heights: Vec<f64> = maxima.iter().take(in_cycle).map(|m| m.1).collect();
     heights.sort_by(|a, b| b.total_cmp(a));
     Ok(Attractor {
-        kind: kind(period, exponent, with_exponent),
+        kind: kind(period, exponent, with_exponent, &maxima),
         residual,
         cycle_s,
         exponent_per_s: exponent.map(|e| e.per_s),
@@ -193,16 +207,40 @@ pub fn attractor(
 }
 
 /// Maxima and exponent must agree.
-fn kind(period: Period, exponent: Option<Exponent>, with_exponent: bool) -> Kind {
+fn kind(
+    period: Period,
+    exponent: Option<Exponent>,
+    with_exponent: bool,
+    maxima: &[(f64, f64)],
+) -> Kind {
     let positive = exponent.map(|e| e.is_positive());
     match period {
         Period::Equilibrium => Kind::Equilibrium,
         Period::Periodic { maxima, .. } if positive == Some(false) || !with_exponent => {
             Kind::Periodic(maxima)
         }
-        Period::Aperiodic { .. } if positive == Some(true) => Kind::Chaos,
+        Period::Aperiodic { .. } if positive == Some(true) => match bands(maxima) {
+            1 => Kind::Chaos,
+            bands => Kind::BandedChaos(bands),
+        },
         _ => Kind::Undecided,
     }
+}
+
+/// The greatest number of bands, up to six, that the maxima visit in turn without any two of them meeting.
+fn bands(maxima: &[(f64, f64)]) -> usize {
+    let apart = |n: usize| {
+        let band = |k: usize| {
+            let heights = maxima.iter().skip(k).step_by(n).map(|m| m.1);
+            let empty = (f64::INFINITY, f64::NEG_INFINITY);
+            heights.fold(empty, |(low, high), h| (h.min(low), h.max(high)))
+        };
+        let mut bands: Vec<_> = (0..n).map(band).collect();
+        bands.sort_by(|a, b| a.0.total_cmp(&b.0));
+        bands.windows(2).all(|pair| pair[0].1 < pair[1].0)
+    };
+    let most = MAX_BANDS.min(maxima.len() / MAXIMA_PER_BAND);
+    (2..=most).rev().find(|&n| apart(n)).unwrap_or(1)
 }
 
 fn exponent(

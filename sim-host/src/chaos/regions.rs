@@ -1,6 +1,7 @@
 //! Regions of a parameter in which the motion is of one kind, and their edges.
 
 use crate::chaos::attractor::{Attractor, Kind, attractor};
+use crate::chaos::equilibria;
 use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, scenarios};
 use rayon::prelude::*;
 use shared_model::Scenario;
@@ -153,4 +154,33 @@ fn stretches(samples: &[Sample], edges: &[Edge]) -> Vec<Region> {
     let kinds = std::iter::once(first.attractor.kind).chain(edges.iter().map(|e| e.above));
     let stretch = |((from, to), kind)| Region { from, to, kind };
     froms.zip(tos).zip(kinds).map(stretch).collect()
+}
+
+/// The values looked at in both sweeps at which they end on attractors that differ, ascending.
+///
+/// # Errors
+/// If a value's scenario is not valid.
+pub fn coexisting(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    one: &Regions,
+    other: &Regions,
+) -> Result<Vec<f64>, SweepError> {
+    let mut values = Vec::new();
+    for sample in &one.samples {
+        let value = sample.value;
+        let same_value = |s: &Sample| s.value.total_cmp(&value);
+        let Ok(k) = other.samples.binary_search_by(same_value) else {
+            continue;
+        };
+        let equilibria = match sample.attractor.kind {
+            Kind::Equilibrium => equilibria::find(&parameter.set(scenario, value))?,
+            _ => Vec::new(),
+        };
+        let met = &other.samples[k].attractor;
+        if !sample.attractor.is_same(met, &equilibria) {
+            values.push(value);
+        }
+    }
+    Ok(values)
 }

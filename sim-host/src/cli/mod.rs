@@ -1,13 +1,18 @@
 //! One file a subcommand, and what they share: exit codes, configuration options, output files.
 
 mod averaging;
+mod basin;
 mod config;
 mod convergence;
 mod decode;
+mod equilibria;
+mod orbit;
 mod output;
 mod qemu;
+mod regions;
 mod reproduce;
 mod simulate;
+mod sweep;
 mod verify;
 
 use clap::{Args, Parser, Subcommand};
@@ -43,6 +48,10 @@ enum Command {
     Reproduce(reproduce::Arguments),
     Averaging(averaging::Arguments),
     Convergence(convergence::Arguments),
+    Orbit(orbit::Arguments),
+    Regions(regions::Arguments),
+    Equilibria(equilibria::Arguments),
+    Basin(basin::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
     Qemu(qemu::Arguments),
@@ -76,6 +85,10 @@ pub fn main() -> ExitCode {
         Command::Reproduce(arguments) => reproduce::run(&arguments),
         Command::Averaging(arguments) => averaging::run(&arguments),
         Command::Convergence(arguments) => convergence::run(&arguments),
+        Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Regions(arguments) => regions::run(&arguments),
+        Command::Equilibria(arguments) => equilibria::run(&arguments),
+        Command::Basin(arguments) => basin::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),

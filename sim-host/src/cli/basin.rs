@@ -1,0 +1,161 @@
+//! `sim-host basin`: which start ends on which attractor.
+
+use super::output::Destinations;
+use super::sweep::{TransientOptions, check_interrupted, threads, with_progress};
+use super::{Done, RunOptions};
+use serde::Serialize;
+use sim_host::chaos::attractor::{Attractor, Kind};
+use sim_host::chaos::basin::{Basin, basin};
+use sim_host::chaos::sweep::{Timing, Values};
+use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+
+/// Basins of attraction: which start ends on which attractor, over a grid of sideslip and steering angles.
+///
+/// Yaw rate and steering rate start as in the scenario. Starts whose motion diverges are named as such.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host basin --rpm 1750 --out basin.csv --figure basin.svg
+  sim-host basin --rpm 1600 --beta-from -0.4 --beta-to 0.4 --beta-step 0.02 --delta-step 0.02 --json basin.json")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Least sideslip angle at the start, rad
+    #[arg(long, value_name = "RAD", default_value_t = -0.3, allow_negative_numbers = true)]
+    beta_from: f64,
+    /// Greatest sideslip angle at the start, rad
+    #[arg(
+        long,
+        value_name = "RAD",
+        default_value_t = 0.3,
+        allow_negative_numbers = true
+    )]
+    beta_to: f64,
+    /// Step of the sideslip angle, rad
+    #[arg(
+        long,
+        value_name = "RAD",
+        default_value_t = 0.03,
+        allow_negative_numbers = true
+    )]
+    beta_step: f64,
+    /// Least steering angle at the start, rad
+    #[arg(long, value_name = "RAD", default_value_t = -0.6, allow_negative_numbers = true)]
+    delta_from: f64,
+    /// Greatest steering angle at the start, rad
+    #[arg(
+        long,
+        value_name = "RAD",
+        default_value_t = 0.6,
+        allow_negative_numbers = true
+    )]
+    delta_to: f64,
+    /// Step of the steering angle, rad
+    #[arg(
+        long,
+        value_name = "RAD",
+        default_value_t = 0.05,
+        allow_negative_numbers = true
+    )]
+    delta_step: f64,
+    #[command(flatten)]
+    transient: TransientOptions,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+/// Length of a run behind the transient unless `--time` says otherwise, s.
+const OBSERVED_S: f64 = 200.0;
+
+#[derive(Serialize)]
+struct Results<'a> {
+    wheel_speed_rpm: f64,
+    timing: Timing,
+    #[serde(flatten)]
+    basin: &'a Basin,
+}
+
+/// A row of the CSV.
+#[derive(Serialize)]
+struct Row {
+    sideslip_rad: f64,
+    steering_angle_rad: f64,
+    attractor: usize,
+    kind: String,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenario = arguments.run.scenario()?;
+    let (from, to) = (arguments.beta_from, arguments.beta_to);
+    let betas = Values::new("sideslip angle (rad)", from, to, arguments.beta_step)?;
+    let (from, to) = (arguments.delta_from, arguments.delta_to);
+    let deltas = Values::new("steering angle (rad)", from, to, arguments.delta_step)?;
+    let timing = arguments.transient.timing(&arguments.run, OBSERVED_S)?;
+    arguments.destinations.check_free()?;
+    let runs = betas.count().saturating_mul(deltas.count());
+    let announced = &arguments.transient;
+    announced.announce(runs, timing, &scenario, threads())?;
+    let basin = with_progress(runs, |watch| {
+        basin(&scenario, &betas, &deltas, timing, watch)
+    })?;
+    let results = Results {
+        wheel_speed_rpm: scenario.run.wheel_speed_rpm,
+        timing,
+        basin: &basin,
+    };
+    let rows = basin.cells.iter().map(|cell| Row {
+        sideslip_rad: cell.sideslip_rad,
+        steering_angle_rad: cell.steering_angle_rad,
+        attractor: cell.attractor,
+        kind: basin.attractors[cell.attractor].kind.to_string(),
+    });
+    arguments
+        .destinations
+        .write(rows, &results, || chart(&results).svg())?;
+    for (k, attractor) in basin.attractors.iter().enumerate() {
+        let cells = basin.cells.iter().filter(|c| c.attractor == k).count();
+        println!("attractor {k}: {} ({cells} starts)", name(attractor));
+    }
+    check_interrupted(basin.cells.len(), runs)?;
+    Ok(Done::Well)
+}
+
+/// Kind and place.
+fn name(attractor: &Attractor) -> String {
+    let kind = attractor.kind;
+    match kind {
+        Kind::Diverges => kind.to_string(),
+        Kind::Equilibrium => {
+            let [beta, _, delta, _] = attractor.end;
+            format!("{kind} near beta {beta:.3}, delta_f {delta:.3} rad")
+        }
+        _ => {
+            let (low, high) = attractor.yaw_rates_rad_per_s();
+            let lobe = attractor.lobe();
+            format!("{kind}, yaw rate {low:.2} to {high:.2} rad/s, steering angle {lobe}")
+        }
+    }
+}
+
+fn chart(results: &Results) -> Chart {
+    let basin = results.basin;
+    let series = |(k, attractor): (usize, &Attractor)| Series {
+        label: name(attractor),
+        points: basin
+            .cells
+            .iter()
+            .filter(|cell| cell.attractor == k)
+            .map(|cell| (cell.sideslip_rad, cell.steering_angle_rad))
+            .collect(),
+        look: Look::Dots,
+    };
+    Chart {
+        heading: format!("Basins of attraction at {} rpm", results.wheel_speed_rpm),
+        panels: vec![Panel {
+            caption: "where the motion ends, by its start".into(),
+            x: AxisSpec::linear("sideslip angle at the start (rad)"),
+            y: AxisSpec::linear("steering angle at the start (rad)"),
+            series: basin.attractors.iter().enumerate().map(series).collect(),
+            ..Panel::default()
+        }],
+    }
+}

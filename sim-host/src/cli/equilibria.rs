@@ -1,0 +1,287 @@
+//! `sim-host equilibria`: equilibria, their eigenvalues, and Hopf bifurcations.
+
+use super::output::Destinations;
+use super::sweep::{check_interrupted, with_progress};
+use super::{Done, RunOptions};
+use anyhow::{bail, ensure};
+use serde::Serialize;
+use shared_model::vehicle::STEERING_ANGLE;
+use sim_host::chaos::equilibria::{Equilibrium, Hopf, hopf, over_speed};
+use sim_host::chaos::polynomial::Complex;
+use sim_host::chaos::sweep::Values;
+use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+
+/// All equilibria at a wheel speed or over a range of speeds, with eigenvalues and stability, and the speeds of Hopf
+/// bifurcations.
+///
+/// With the mean of the dither. Coulomb friction holds the steering in a band around each equilibrium, which is reported with
+/// it; the eigenvalues are those of sliding motion beside the equilibrium, and, in the JSON, of the motion with the steering
+/// held.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host equilibria --rpm 1750                                          all equilibria of the paper's vehicle
+  sim-host equilibria --from 1000 --to 2000 --step 10 --figure hopf.svg   over speed, with Hopf bifurcations
+  sim-host equilibria --rpm 1750 --dither square --amplitude-v 0.1 --json equilibria.json")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Least wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        requires = "to",
+        conflicts_with = "rpm",
+        allow_negative_numbers = true
+    )]
+    from: Option<f64>,
+    /// Greatest wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        requires = "from",
+        allow_negative_numbers = true
+    )]
+    to: Option<f64>,
+    /// Step of the wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 10.0,
+        allow_negative_numbers = true
+    )]
+    step: f64,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+/// More speeds than this are refused: two such runs do the same.
+const MOST_SPEEDS: usize = 100_000;
+
+#[derive(Serialize)]
+struct Results {
+    speeds: Vec<Speed>,
+    hopf: Vec<Hopf>,
+}
+
+#[derive(Serialize)]
+struct Speed {
+    wheel_speed_rpm: f64,
+    equilibria: Vec<Equilibrium>,
+}
+
+/// A row of the CSV.
+#[derive(Serialize)]
+struct Row {
+    wheel_speed_rpm: f64,
+    sideslip_rad: f64,
+    yaw_rate_rad_per_s: f64,
+    steering_angle_rad: f64,
+    residual: f64,
+    stable: bool,
+    eigenvalue_1_re_per_s: f64,
+    eigenvalue_1_im_per_s: f64,
+    eigenvalue_2_re_per_s: f64,
+    eigenvalue_2_im_per_s: f64,
+    eigenvalue_3_re_per_s: f64,
+    eigenvalue_3_im_per_s: f64,
+    eigenvalue_4_re_per_s: f64,
+    eigenvalue_4_im_per_s: f64,
+    stick_band_steering_angle_1_rad: Option<f64>,
+    stick_band_steering_angle_2_rad: Option<f64>,
+    stable_while_sticking: Option<bool>,
+}
+
+impl Row {
+    fn new(wheel_speed_rpm: f64, equilibrium: &Equilibrium) -> Self {
+        let zero = Complex { re: 0.0, im: 0.0 };
+        let eigenvalue = |k: usize| equilibrium.eigenvalues_per_s.get(k).unwrap_or(&zero);
+        let band = equilibrium.stick_band.as_ref();
+        Self {
+            wheel_speed_rpm,
+            sideslip_rad: equilibrium.state[0],
+            yaw_rate_rad_per_s: equilibrium.state[1],
+            steering_angle_rad: equilibrium.state[2],
+            residual: equilibrium.residual,
+            stable: equilibrium.stable,
+            eigenvalue_1_re_per_s: eigenvalue(0).re,
+            eigenvalue_1_im_per_s: eigenvalue(0).im,
+            eigenvalue_2_re_per_s: eigenvalue(1).re,
+            eigenvalue_2_im_per_s: eigenvalue(1).im,
+            eigenvalue_3_re_per_s: eigenvalue(2).re,
+            eigenvalue_3_im_per_s: eigenvalue(2).im,
+            eigenvalue_4_re_per_s: eigenvalue(3).re,
+            eigenvalue_4_im_per_s: eigenvalue(3).im,
+            stick_band_steering_angle_1_rad: band.map(|b| b.lower[STEERING_ANGLE]),
+            stick_band_steering_angle_2_rad: band.map(|b| b.upper[STEERING_ANGLE]),
+            stable_while_sticking: band.map(|b| b.stable),
+        }
+    }
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenario = arguments.run.scenario()?;
+    if let Some(time_s) = arguments.run.time {
+        bail!("--time {time_s}: equilibria are solved for, not run to; leave it out");
+    }
+    let rpm = scenario.run.wheel_speed_rpm;
+    let (from, to) = (arguments.from.unwrap_or(rpm), arguments.to.unwrap_or(rpm));
+    let values = Values::new("wheel speed (rpm)", from, to, arguments.step)?;
+    ensure!(
+        values.count() <= MOST_SPEEDS,
+        "{} speeds: must be at most {MOST_SPEEDS}",
+        values.count()
+    );
+    arguments.destinations.check_free()?;
+    let found = with_progress(values.count(), |watch| {
+        over_speed(&scenario, &values, watch)
+    })?;
+    let hopf = hopf(&scenario, &found)?;
+    let speed = |(wheel_speed_rpm, equilibria)| Speed {
+        wheel_speed_rpm,
+        equilibria,
+    };
+    let results = Results {
+        speeds: found.into_iter().map(speed).collect(),
+        hopf,
+    };
+    let rows = results.speeds.iter().flat_map(|speed| {
+        let row = |equilibrium| Row::new(speed.wheel_speed_rpm, equilibrium);
+        speed.equilibria.iter().map(row)
+    });
+    arguments
+        .destinations
+        .write(rows, &results, || chart(&results).svg())?;
+    show(&results);
+    check_interrupted(results.speeds.len(), values.count())?;
+    Ok(Done::Well)
+}
+
+fn show(results: &Results) {
+    if let [speed] = &results.speeds[..] {
+        show_speed(speed);
+    } else {
+        println!("equilibria at {} speeds", results.speeds.len());
+    }
+    for hopf in &results.hopf {
+        println!(
+            "Hopf bifurcation from {:.3} to {:.3} rpm at delta_f = {:.4} rad, {:.4} rad/s: {} above",
+            hopf.lower_rpm,
+            hopf.upper_rpm,
+            hopf.state[STEERING_ANGLE],
+            hopf.frequency_rad_per_s,
+            if hopf.destabilises {
+                "unstable"
+            } else {
+                "stable"
+            }
+        );
+    }
+    if results.speeds.len() > 1 && results.hopf.is_empty() {
+        println!("no Hopf bifurcation between these speeds");
+    }
+}
+
+fn show_speed(speed: &Speed) {
+    println!(
+        "{} equilibria at {} rpm",
+        speed.equilibria.len(),
+        speed.wheel_speed_rpm
+    );
+    for equilibrium in &speed.equilibria {
+        let [beta, gamma, delta, _] = equilibrium.state;
+        let eigenvalues = &equilibrium.eigenvalues_per_s;
+        let eigenvalues: Vec<_> = eigenvalues.iter().map(Complex::to_string).collect();
+        let stability = if equilibrium.stable {
+            "stable"
+        } else {
+            "unstable"
+        };
+        println!(
+            "  beta {beta:.6} rad, gamma {gamma:.6} rad/s, delta_f {delta:.6} rad: {stability}\n    eigenvalues {} 1/s",
+            eigenvalues.join(", ")
+        );
+        if let Some(band) = &equilibrium.stick_band {
+            println!(
+                "    sticks for delta_f from {:.6} to {:.6} rad, {} while it does",
+                band.lower[STEERING_ANGLE].min(band.upper[STEERING_ANGLE]),
+                band.lower[STEERING_ANGLE].max(band.upper[STEERING_ANGLE]),
+                if band.stable { "stable" } else { "unstable" }
+            );
+        }
+    }
+}
+
+fn chart(results: &Results) -> Chart {
+    match &results.speeds[..] {
+        [speed] => eigenvalue_chart(speed),
+        speeds => speed_chart(speeds, &results.hopf),
+    }
+}
+
+/// The eigenvalues at one speed in the complex plane.
+fn eigenvalue_chart(speed: &Speed) -> Chart {
+    let points = |stable: bool| {
+        let chosen = speed.equilibria.iter().filter(move |e| e.stable == stable);
+        let all = chosen.flat_map(|e| &e.eigenvalues_per_s);
+        all.map(|e| (e.re, e.im)).collect()
+    };
+    let series = |label: &str, stable| Series {
+        label: label.into(),
+        points: points(stable),
+        look: Look::Dots,
+    };
+    Chart {
+        heading: format!(
+            "Eigenvalues of the equilibria at {} rpm",
+            speed.wheel_speed_rpm
+        ),
+        panels: vec![Panel {
+            x: AxisSpec::linear("real part (1/s)"),
+            y: AxisSpec::linear("imaginary part (1/s)"),
+            series: vec![series("stable", true), series("unstable", false)],
+            instants: vec![(0.0, String::new())],
+            ..Panel::default()
+        }],
+    }
+}
+
+fn speed_chart(speeds: &[Speed], hopf: &[Hopf]) -> Chart {
+    let series = |label: &str, stable: bool, of: fn(&Equilibrium) -> Option<f64>| {
+        let points = speeds.iter().flat_map(|speed| {
+            let chosen = speed.equilibria.iter().filter(|e| e.stable == stable);
+            chosen.filter_map(|e| Some((speed.wheel_speed_rpm, of(e)?)))
+        });
+        Series {
+            label: label.into(),
+            points: points.collect(),
+            look: Look::Dots,
+        }
+    };
+    let panel = |caption: &str, y: &str, of: fn(&Equilibrium) -> Option<f64>| Panel {
+        caption: caption.into(),
+        x: AxisSpec::linear("wheel speed (rpm)"),
+        y: AxisSpec::linear(y),
+        series: vec![series("stable", true, of), series("unstable", false, of)],
+        instants: hopf
+            .iter()
+            .map(|h| (0.5 * (h.lower_rpm + h.upper_rpm), "Hopf".into()))
+            .collect(),
+        ..Panel::default()
+    };
+    let growth = |e: &Equilibrium| Some(e.leading_pair()?.re);
+    let mut growths = panel(
+        "growth of the leading pair of complex eigenvalues",
+        "real part (1/s)",
+        growth,
+    );
+    growths.levels = vec![0.0];
+    Chart {
+        heading: "Equilibria over wheel speed".into(),
+        panels: vec![
+            panel("steering angle at rest", "steering angle (rad)", |e| {
+                Some(e.state[STEERING_ANGLE])
+            }),
+            growths,
+        ],
+    }
+}

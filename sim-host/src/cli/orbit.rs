@@ -1,0 +1,245 @@
+//! `sim-host orbit`: the orbit diagram.
+
+use super::output::Destinations;
+use super::sweep::{
+    RangeOptions, TransientOptions, check_interrupted, paper_regions, threads, with_progress,
+};
+use super::{Done, RunOptions};
+use clap::ValueEnum;
+use serde::Serialize;
+use shared_model::Scenario;
+use sim_host::chaos::orbit::{Component, Outcome, Point, Section, Start, diagram};
+use sim_host::chaos::sweep::{Parameter, Timing};
+use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+
+/// Orbit diagram (bifurcation diagram): maxima of the yaw rate, or crossings of a section, over wheel speed or dither
+/// amplitude.
+///
+/// Each run starts as the scenario does, or where its neighbour ended (`--start up` or `down`), so hysteresis shows. The
+/// dither is averaged and on from the start. Motions that diverge are named as such and have no values.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host orbit --from 1600 --to 1900 --step 1 --out orbit.csv --figure orbit.svg      the paper's Figure 6
+  sim-host orbit --over amplitude --dither square --rpm 1750 --figure square.svg        Figure 8
+  sim-host orbit --over amplitude --dither sine --from 0 --to 1.4 --step 0.005 --figure sine.svg
+  sim-host orbit --start down --section steering-rate --level 0 --out down.csv")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: RunOptions,
+    #[command(flatten)]
+    range: RangeOptions,
+    #[command(flatten)]
+    transient: TransientOptions,
+    /// From where each run starts
+    #[arg(long, value_enum, default_value_t = StartOption::Fixed)]
+    start: StartOption,
+    /// What is shown: the yaw rate's maxima, or the yaw rate (of the yaw rate the sideslip angle) where a component rises
+    /// through `--level`
+    #[arg(long, value_enum, default_value_t = SectionOption::YawRateMaxima)]
+    section: SectionOption,
+    /// Level of the section, rad or rad/s
+    #[arg(
+        long,
+        value_name = "VALUE",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    level: f64,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum StartOption {
+    /// As the scenario does
+    Fixed,
+    /// Where the next lower value's run ended
+    Up,
+    /// Where the next higher value's run ended
+    Down,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum SectionOption {
+    /// Local maxima of the yaw rate
+    YawRateMaxima,
+    /// Sideslip angle, rising
+    Sideslip,
+    /// Yaw rate, rising
+    YawRate,
+    /// Steering angle, rising
+    SteeringAngle,
+    /// Steering rate, rising
+    SteeringRate,
+}
+
+impl SectionOption {
+    fn section(self, level: f64) -> Section {
+        let component = match self {
+            Self::YawRateMaxima => return Section::YawRateMaxima,
+            Self::Sideslip => Component::Sideslip,
+            Self::YawRate => Component::YawRate,
+            Self::SteeringAngle => Component::SteeringAngle,
+            Self::SteeringRate => Component::SteeringRate,
+        };
+        Section::Rising { component, level }
+    }
+}
+
+/// Length of a run behind the transient unless `--time` says otherwise, s.
+const OBSERVED_S: f64 = 200.0;
+
+#[derive(Serialize)]
+struct Results<'a> {
+    parameter: Parameter,
+    section: Section,
+    shown: Component,
+    start: Start,
+    timing: Timing,
+    points: &'a [Point],
+}
+
+/// A row of the CSV.
+#[derive(Serialize)]
+struct Row {
+    wheel_speed_rpm: f64,
+    dither_amplitude_v: f64,
+    outcome: &'static str,
+    yaw_rate_rad_per_s: Option<f64>,
+    sideslip_rad: Option<f64>,
+    diverges_at_s: Option<f64>,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenario = arguments.run.scenario()?;
+    let parameter = arguments.range.parameter();
+    let values = arguments.range.values(&scenario)?;
+    let timing = arguments.transient.timing(&arguments.run, OBSERVED_S)?;
+    anyhow::ensure!(
+        arguments.level.is_finite(),
+        "--level {}: must be a finite number",
+        arguments.level
+    );
+    let section = arguments.section.section(arguments.level);
+    let (start, threads) = match arguments.start {
+        StartOption::Fixed => (Start::Fixed, threads()),
+        StartOption::Up => (Start::Up, 1),
+        StartOption::Down => (Start::Down, 1),
+    };
+    arguments.destinations.check_free()?;
+    let announced = &arguments.transient;
+    announced.announce(values.count(), timing, &scenario, threads)?;
+    let points = with_progress(values.count(), |watch| {
+        diagram(&scenario, parameter, &values, section, timing, start, watch)
+    })?;
+    let results = Results {
+        parameter,
+        section,
+        shown: section.shown(),
+        start,
+        timing,
+        points: &points,
+    };
+    let rows = points
+        .iter()
+        .flat_map(|point| rows(&scenario, parameter, section, point));
+    arguments
+        .destinations
+        .write(rows, &results, || chart(&results).svg())?;
+    println!("{}", summary(&results));
+    check_interrupted(points.len(), values.count())?;
+    Ok(Done::Well)
+}
+
+fn rows(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    section: Section,
+    point: &Point,
+) -> Vec<Row> {
+    let scenario = parameter.set(scenario, point.value);
+    let row = |outcome, value: Option<f64>, diverges_at_s| Row {
+        wheel_speed_rpm: scenario.run.wheel_speed_rpm,
+        dither_amplitude_v: scenario.dither.active_amplitude_v(),
+        outcome,
+        yaw_rate_rad_per_s: value.filter(|_| section.shown() == Component::YawRate),
+        sideslip_rad: value.filter(|_| section.shown() == Component::Sideslip),
+        diverges_at_s,
+    };
+    match &point.orbit {
+        Outcome::Meets { values } => {
+            let meeting = |&value: &f64| row("meets", Some(value), None);
+            values.iter().map(meeting).collect()
+        }
+        Outcome::Misses => vec![row("misses", None, None)],
+        Outcome::Rests { value } => vec![row("rests", Some(*value), None)],
+        Outcome::Diverges { time_s } => vec![row("diverges", None, Some(*time_s))],
+    }
+}
+
+fn summary(results: &Results) -> String {
+    let count = |is: fn(&Outcome) -> bool| results.points.iter().filter(|p| is(&p.orbit)).count();
+    let met = count(|o| matches!(o, Outcome::Meets { .. }));
+    let rests = count(|o| matches!(o, Outcome::Rests { .. }));
+    let misses = count(|o| matches!(o, Outcome::Misses));
+    let diverges = count(|o| matches!(o, Outcome::Diverges { .. }));
+    format!(
+        "{} values of {}: {met} meet the section, {rests} come to rest, {misses} miss it, {diverges} diverge",
+        results.points.len(),
+        results.parameter.name()
+    )
+}
+
+fn chart(results: &Results) -> Chart {
+    let points = |point: &Point| -> Vec<(f64, f64)> {
+        let at = |&value: &f64| (point.value, value);
+        match &point.orbit {
+            Outcome::Meets { values } => values.iter().map(at).collect(),
+            Outcome::Rests { value } => vec![(point.value, *value)],
+            Outcome::Misses | Outcome::Diverges { .. } => Vec::new(),
+        }
+    };
+    let (name, shown) = (results.parameter.name(), results.shown.name());
+    let first = results.points.first().map_or(0.0, |p| p.value);
+    let last = results.points.last().map_or(0.0, |p| p.value);
+    let caption = match results.section {
+        Section::YawRateMaxima => "local maxima of the yaw rate".into(),
+        Section::Rising { component, level } => {
+            format!(
+                "{shown} where the {} rises through {level}",
+                component.name()
+            )
+        }
+    };
+    let from = match results.start {
+        Start::Fixed => "each from the same start",
+        Start::Up => "continued upwards",
+        Start::Down => "continued downwards",
+    };
+    let regions = paper_regions(results.parameter, first, last);
+    let paper = if regions.is_empty() {
+        ""
+    } else {
+        "; I to IV: the paper's regions"
+    };
+    let axis = AxisSpec::linear(name);
+    Chart {
+        heading: format!("Orbit diagram over {name}"),
+        panels: vec![Panel {
+            caption: format!("{caption}, {from}{paper}"),
+            x: if first < last {
+                axis.from_to(first, last)
+            } else {
+                axis
+            },
+            y: AxisSpec::linear(shown),
+            series: vec![Series {
+                label: String::new(),
+                points: results.points.iter().flat_map(points).collect(),
+                look: Look::Dots,
+            }],
+            regions,
+            ..Panel::default()
+        }],
+    }
+}

@@ -1,0 +1,245 @@
+//! `sim-host regions`: kinds of motion along a sweep, and the edges between them.
+
+use super::output::Destinations;
+use super::sweep::{
+    RangeOptions, TransientOptions, check_interrupted, paper_regions, threads, with_progress,
+};
+use super::{Done, RunOptions};
+use anyhow::ensure;
+use serde::Serialize;
+use shared_model::Scenario;
+use sim_host::chaos::regions::{Regions, Sample, coexisting, regions};
+use sim_host::chaos::sweep::{Parameter, Timing, mirrored};
+use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+
+/// Kinds of motion (equilibrium, period-n, chaos) over wheel speed or dither amplitude, with each edge between them bisected.
+///
+/// The period is that of the yaw rate's maxima; chaos is a largest Lyapunov exponent above three standard errors and above
+/// what the run can tell from zero. Where the two disagree the motion is undecided. Chaos whose maxima visit n separate
+/// bands in turn is told from chaos in one. From the scenario's start and from the mirrored one, on the other lobe of the
+/// steering angle; attractors that coexist are named.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host regions --from 1600 --to 1900 --step 5 --figure regions.svg        the paper's regions I to IV
+  sim-host regions --from 1820 --to 1860 --step 1 --width 0.1 --transient 1000 --time 2000 --json regions.json
+  sim-host regions --over amplitude --dither square --from 0 --to 0.14 --step 0.002 --out square.csv")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: RunOptions,
+    #[command(flatten)]
+    range: RangeOptions,
+    /// Width to which an edge is located [default: 0.5 rpm; 0.0005 V]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    width: Option<f64>,
+    #[command(flatten)]
+    transient: TransientOptions,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+/// Length of a run behind the transient unless `--time` says otherwise, s.
+const OBSERVED_S: f64 = 400.0;
+/// Finer widths only resolve rounding.
+const LEAST_WIDTH: f64 = 1e-9;
+
+#[derive(Serialize)]
+struct Results {
+    parameter: Parameter,
+    timing: Timing,
+    width: f64,
+    sweeps: Vec<Sweep>,
+    /// Values at which the two starts end on attractors that differ.
+    coexisting_at: Vec<f64>,
+}
+
+#[derive(Serialize)]
+struct Sweep {
+    start: &'static str,
+    #[serde(flatten)]
+    found: Regions,
+}
+
+/// A row of the CSV.
+#[derive(Serialize)]
+struct Row<'a> {
+    start: &'a str,
+    wheel_speed_rpm: f64,
+    dither_amplitude_v: f64,
+    kind: String,
+    steering_angle_lobe: &'a str,
+    period_residual: Option<f64>,
+    cycle_s: Option<f64>,
+    exponent_per_s: Option<f64>,
+    exponent_threshold_per_s: Option<f64>,
+    yaw_rate_min_rad_per_s: Option<f64>,
+    yaw_rate_max_rad_per_s: Option<f64>,
+    diverges_at_s: Option<f64>,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenario = arguments.run.scenario()?;
+    let parameter = arguments.range.parameter();
+    let values = arguments.range.values(&scenario)?;
+    let timing = arguments.transient.timing(&arguments.run, OBSERVED_S)?;
+    let width = arguments.width.unwrap_or(parameter.edge_width());
+    ensure!(
+        width >= LEAST_WIDTH && width.is_finite(),
+        "--width {width}: must be a finite number of at least {LEAST_WIDTH} {}",
+        parameter.unit()
+    );
+    arguments.destinations.check_free()?;
+    let runs = 2 * values.count();
+    let announced = &arguments.transient;
+    announced.announce(runs, timing, &scenario, threads())?;
+    let starts = [("given", scenario), ("mirrored", mirrored(&scenario))];
+    let sweeps = with_progress(runs, |watch| {
+        let sweep = |(start, scenario)| {
+            let found = regions(&scenario, parameter, &values, width, timing, watch)?;
+            anyhow::Ok(Sweep { start, found })
+        };
+        starts.into_iter().map(sweep).collect::<Result<Vec<_>, _>>()
+    })?;
+    let coexisting_at = coexisting(&scenario, parameter, &sweeps[0].found, &sweeps[1].found)?;
+    let results = Results {
+        parameter,
+        timing,
+        width,
+        sweeps,
+        coexisting_at,
+    };
+    let rows = results.sweeps.iter().flat_map(|sweep| {
+        let row = |sample| row(&scenario, parameter, sweep.start, sample);
+        sweep.found.samples.iter().map(row)
+    });
+    arguments
+        .destinations
+        .write(rows, &results, || chart(&results).svg())?;
+    show(&results);
+    let done = results.sweeps.iter().map(|s| s.found.samples.len()).sum();
+    check_interrupted(done, runs.max(done))?;
+    Ok(Done::Well)
+}
+
+fn row<'a>(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    start: &'a str,
+    sample: &'a Sample,
+) -> Row<'a> {
+    let scenario = parameter.set(scenario, sample.value);
+    let attractor = &sample.attractor;
+    let (low, high) = attractor.yaw_rates_rad_per_s();
+    let stays = attractor.diverges_at_s.is_none();
+    Row {
+        start,
+        wheel_speed_rpm: scenario.run.wheel_speed_rpm,
+        dither_amplitude_v: scenario.dither.active_amplitude_v(),
+        kind: attractor.kind.to_string(),
+        steering_angle_lobe: if stays { attractor.lobe() } else { "" },
+        period_residual: attractor.residual,
+        cycle_s: attractor.cycle_s,
+        exponent_per_s: attractor.exponent_per_s,
+        exponent_threshold_per_s: attractor.exponent_threshold_per_s,
+        yaw_rate_min_rad_per_s: stays.then_some(low),
+        yaw_rate_max_rad_per_s: stays.then_some(high),
+        diverges_at_s: attractor.diverges_at_s,
+    }
+}
+
+fn show(results: &Results) {
+    let unit = results.parameter.unit();
+    for sweep in &results.sweeps {
+        println!("from the {} start:", sweep.start);
+        for region in &sweep.found.regions {
+            let inside = |s: &&Sample| (region.from..=region.to).contains(&s.value);
+            let mut lobes: Vec<_> = sweep.found.samples.iter().filter(inside).collect();
+            lobes.dedup_by_key(|sample| sample.attractor.lobe());
+            let lobes: Vec<_> = lobes.iter().map(|s| s.attractor.lobe()).collect();
+            println!(
+                "  {:10.4} to {:10.4} {unit}  {}, steering angle {}",
+                region.from,
+                region.to,
+                region.kind,
+                lobes.join(" or ")
+            );
+        }
+        for edge in &sweep.found.edges {
+            println!(
+                "  edge from {:.4} to {:.4} {unit}: {} below, {} above",
+                edge.lower, edge.upper, edge.below, edge.above
+            );
+        }
+    }
+    let at = &results.coexisting_at;
+    match (at.first(), at.last()) {
+        (Some(first), Some(last)) => println!(
+            "two attractors coexist at {} values from {first} to {last} {unit}",
+            at.len()
+        ),
+        _ => println!("both starts end on the same attractor at every value"),
+    }
+}
+
+fn chart(results: &Results) -> Chart {
+    let name = results.parameter.name();
+    let samples = || results.sweeps.iter().flat_map(|s| &s.found.samples);
+    let values = || samples().map(|sample| sample.value);
+    let first = values().fold(f64::INFINITY, f64::min);
+    let last = values().fold(f64::NEG_INFINITY, f64::max);
+    let paper = paper_regions(results.parameter, first, last);
+    let series = |of: fn(&Sample) -> Vec<f64>, look: fn(usize) -> Look| -> Vec<Series> {
+        let one = |(n, sweep): (usize, &Sweep)| Series {
+            label: format!("from the {} start", sweep.start),
+            points: sweep
+                .found
+                .samples
+                .iter()
+                .flat_map(|s| of(s).into_iter().map(|y| (s.value, y)))
+                .collect(),
+            look: look(n),
+        };
+        results.sweeps.iter().enumerate().map(one).collect()
+    };
+    let axis = || {
+        let axis = AxisSpec::linear(name);
+        if first < last {
+            axis.from_to(first, last)
+        } else {
+            axis
+        }
+    };
+    let maxima = |sample: &Sample| match sample.attractor.diverges_at_s {
+        Some(_) => Vec::new(),
+        None if sample.attractor.maxima_rad_per_s.is_empty() => {
+            vec![sample.attractor.yaw_rates_rad_per_s().1]
+        }
+        None => sample.attractor.maxima_rad_per_s.clone(),
+    };
+    let exponent = |sample: &Sample| sample.attractor.exponent_per_s.into_iter().collect();
+    let caption = |text: &str| match paper.is_empty() {
+        true => text.to_string(),
+        false => format!("{text}; I to IV: the paper's regions"),
+    };
+    Chart {
+        heading: format!("Kinds of motion over {name}"),
+        panels: vec![
+            Panel {
+                caption: caption("local maxima of the yaw rate"),
+                x: axis(),
+                y: AxisSpec::linear("yaw rate (rad/s)"),
+                series: series(maxima, |_| Look::Dots),
+                regions: paper.clone(),
+                ..Panel::default()
+            },
+            Panel {
+                caption: caption("largest Lyapunov exponent"),
+                x: axis(),
+                y: AxisSpec::linear("exponent (1/s)"),
+                series: series(exponent, Look::Line),
+                regions: paper.clone(),
+                levels: vec![0.0],
+                ..Panel::default()
+            },
+        ],
+    }
+}

@@ -1,0 +1,172 @@
+//! What the subcommands share that make many runs: range, times, cost, progress and the end by Ctrl-C.
+
+use super::RunOptions;
+use anyhow::{bail, ensure};
+use clap::{Args, ValueEnum};
+use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use sim_host::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch};
+use sim_host::motion::Motion;
+use sim_host::paper::REGION_EDGES_RPM;
+use sim_host::pil::qemu::INTERRUPTED;
+use sim_host::report::chart::Region;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+/// More runs than this have their cost said first.
+const MANY: usize = 1000;
+/// More runs than this have to be confirmed.
+const TOO_MANY: usize = 20_000;
+/// Steps that are timed for the cost.
+const TIMED_STEPS: u32 = 20_000;
+
+/// What is swept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Over {
+    /// The wheel speed, rpm
+    Speed,
+    /// The dither's amplitude, V
+    Amplitude,
+}
+
+/// The parameter that is swept, and its values.
+#[derive(Args)]
+pub struct RangeOptions {
+    /// Parameter to sweep
+    #[arg(long, value_enum, default_value_t = Over::Speed)]
+    over: Over,
+    /// Least value, rpm or V [default: 1550 rpm; 0 V]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    from: Option<f64>,
+    /// Greatest value, rpm or V [default: 1900 rpm; 0.14 V of square wave, 1.4 V of sine]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    to: Option<f64>,
+    /// Step, rpm or V [default: a 70th of 350 rpm or of the range of amplitudes]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
+    step: Option<f64>,
+}
+
+impl RangeOptions {
+    /// The parameter.
+    pub fn parameter(&self) -> Parameter {
+        match self.over {
+            Over::Speed => Parameter::Speed,
+            Over::Amplitude => Parameter::Amplitude,
+        }
+    }
+
+    /// Its values.
+    pub fn values(&self, scenario: &Scenario<f64>) -> Result<Values, SweepError> {
+        let (from, to, step) = match (self.over, scenario.dither.waveform) {
+            (Over::Speed, _) => (1550.0, 1900.0, 5.0),
+            (Over::Amplitude, Waveform::Sine) => (0.0, 1.4, 0.02),
+            (Over::Amplitude, _) => (0.0, 0.14, 0.002),
+        };
+        Values::new(
+            self.parameter().name(),
+            self.from.unwrap_or(from),
+            self.to.unwrap_or(to),
+            self.step.unwrap_or(step),
+        )
+    }
+}
+
+/// The times of each run.
+#[derive(Args)]
+pub struct TransientOptions {
+    /// What of each run is not looked at, s; `--time` is the whole run
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 200.0,
+        allow_negative_numbers = true
+    )]
+    transient: f64,
+    /// Make more than 20,000 runs without asking
+    #[arg(long)]
+    yes: bool,
+}
+
+impl TransientOptions {
+    /// The times, `observed_s` being looked at unless `--time` says otherwise.
+    pub fn timing(&self, run: &RunOptions, observed_s: f64) -> Result<Timing, SweepError> {
+        let time_s = run.time.unwrap_or(self.transient + observed_s);
+        Timing::new(self.transient, time_s)
+    }
+
+    /// Says what many runs cost, and refuses too many unless they are confirmed.
+    pub fn announce(
+        &self,
+        runs: usize,
+        timing: Timing,
+        scenario: &Scenario<f64>,
+        threads: usize,
+    ) -> anyhow::Result<()> {
+        if runs <= MANY {
+            return Ok(());
+        }
+        let mut motion = Motion::new(scenario)?;
+        let start = Instant::now();
+        for _ in 0..TIMED_STEPS {
+            motion.step();
+        }
+        let step = start.elapsed().as_secs_f64() / f64::from(TIMED_STEPS);
+        let steps = runs as f64 * timing.time_s() / scenario.step_s();
+        let cost = HumanDuration(Duration::from_secs_f64(step * steps / threads as f64));
+        let cost = format!(
+            "{runs} runs of {} s are {steps:.1e} model steps: at least {cost} on {threads} threads",
+            timing.time_s()
+        );
+        ensure!(
+            runs <= TOO_MANY || self.yes,
+            "{cost}; give --yes to make more than {TOO_MANY}"
+        );
+        eprintln!("{cost}");
+        Ok(())
+    }
+}
+
+/// Threads for independent runs.
+pub fn threads() -> usize {
+    rayon::current_num_threads()
+}
+
+/// Does the work with progress on a terminal, `runs` being expected.
+pub fn with_progress<R>(runs: usize, work: impl FnOnce(Watch) -> R) -> R {
+    let style =
+        ProgressStyle::with_template("{elapsed_precise} [{bar:40}] {pos}/{len} runs, {eta} left")
+            .expect("the template is valid")
+            .progress_chars("=> ");
+    let bar = ProgressBar::new(runs as u64).with_style(style);
+    let result = work(Watch {
+        stop: &INTERRUPTED,
+        done: &|| bar.inc(1),
+    });
+    bar.finish_and_clear();
+    result
+}
+
+/// After Ctrl-C: says what was kept, as the reason why the job was not done in full.
+pub fn check_interrupted(done: usize, of: usize) -> anyhow::Result<()> {
+    if INTERRUPTED.load(Ordering::Relaxed) {
+        bail!("interrupted: {done} of {of} runs were made; the files asked for hold these");
+    }
+    Ok(())
+}
+
+/// The paper's regions I to IV where they meet a sweep over the speed, to be shaded.
+pub fn paper_regions(parameter: Parameter, from: f64, to: f64) -> Vec<Region> {
+    if parameter != Parameter::Speed {
+        return Vec::new();
+    }
+    let [first, second, third] = REGION_EDGES_RPM;
+    let edges = [f64::NEG_INFINITY, first, second, third, f64::INFINITY];
+    let region = |(ends, label): (&[f64], &str)| Region {
+        from: ends[0].max(from),
+        to: ends[1].min(to),
+        label: label.into(),
+    };
+    let all = edges.windows(2).zip(["I", "II", "III", "IV"]).map(region);
+    all.filter(|region| region.to > region.from).collect()
+}
