@@ -274,8 +274,8 @@ impl<T: Real> Model<T> {
         )
     }
 
-    /// Argument of the friction law's sign function: steering rate, or steering angle in the printed law.
-    pub(crate) fn friction_argument(&self) -> usize {
+    /// Index in the state vector of the friction law's argument: steering rate, or steering angle in the printed law.
+    pub fn friction_argument(&self) -> usize {
         match self.friction.law {
             FrictionLaw::PrintedAngle => STEERING_ANGLE,
             FrictionLaw::None | FrictionLaw::CoulombRate => STEERING_RATE,
@@ -283,7 +283,7 @@ impl<T: Real> Model<T> {
     }
 
     /// The friction law's sign function under the dither.
-    pub(crate) fn friction_sign(&self, injection: Injection<T>) -> Sign<T> {
+    pub fn friction_sign(&self, injection: Injection<T>) -> Sign<T> {
         if self.friction.law == FrictionLaw::None {
             return Sign::Zero;
         }
@@ -294,7 +294,7 @@ impl<T: Real> Model<T> {
     }
 
     /// The friction mode in which a step begins: at rest decided by the torques, else by the sign's argument.
-    pub(crate) fn mode_at(&self, x: &Vector4<T>, injection: Injection<T>) -> FrictionMode {
+    pub fn mode_at(&self, x: &Vector4<T>, injection: Injection<T>) -> FrictionMode {
         let argument = x[self.friction_argument()];
         if argument == T::zero() && self.can_stick(injection) {
             self.mode_at_rest(x, injection)
@@ -304,19 +304,19 @@ impl<T: Real> Model<T> {
     }
 
     /// Greatest friction torque, N m.
-    pub(crate) fn friction_limit_nm(&self) -> T {
+    pub fn friction_limit_nm(&self) -> T {
         self.friction_limit_nm
     }
 
     /// The steering comes to rest and may stick: Coulomb friction whose sign function is not dithered, or not yet.
-    pub(crate) fn can_stick(&self, injection: Injection<T>) -> bool {
+    pub fn can_stick(&self, injection: Injection<T>) -> bool {
         let (lower, upper) = (T::zero(), T::zero());
         self.friction.law == FrictionLaw::CoulombRate
             && self.friction_sign(injection) == Sign::Stepped { lower, upper }
     }
 
     /// The mode in which the steering leaves rest, or stays.
-    pub(crate) fn mode_at_rest(&self, x: &Vector4<T>, injection: Injection<T>) -> FrictionMode {
+    pub fn mode_at_rest(&self, x: &Vector4<T>, injection: Injection<T>) -> FrictionMode {
         let torque = self.driving_torque_nm(x, injection);
         if torque > self.friction_limit_nm {
             FrictionMode::Positive

@@ -49,7 +49,7 @@ pub enum ConfigError {
         name: String,
     },
     /// The parameters cannot be run.
-    #[error("{0}")]
+    #[error(transparent)]
     Invalid(#[from] InvalidScenario),
 }
 

@@ -5,14 +5,18 @@
 //! | how does a scenario move? | [`simulate`] |
 //! | how is a motion stepped in a sweep? | [`motion`] |
 //! | is a motion chaotic, or which period has it? | [`chaos`] |
+//! | where does averaging the dither start to hold? | [`averaging`] |
+//! | how good is the fixed step? | [`convergence`], [`engine::reference`] |
 //! | how is the firmware run? | [`pil`] |
 //! | do firmware and host agree? | [`equivalence`] |
 //! | what does a whole verification do? | [`verify`] |
 //! | how are configurations read? | [`config`] |
 //! | how are results shown? | [`report`], [`verdict`] |
 
+pub mod averaging;
 pub mod chaos;
 pub mod config;
+pub mod convergence;
 pub mod engine;
 pub mod equivalence;
 pub mod motion;

@@ -1,8 +1,17 @@
 //! The vehicle's motion on its own, without PWM and telemetry: what sweeps and analyses step.
 
+use crate::trace::is_bounded;
 use shared_model::dither::{Application, Injection};
 use shared_model::vehicle::{Model, State};
 use shared_model::{InvalidScenario, Real, Scenario, integrate};
+
+/// The motion left all physical bounds: angles in rad and rates in rad/s below a thousand.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, serde::Serialize)]
+#[error("the motion diverges at {time_s} s")]
+pub struct Diverged {
+    /// When, s.
+    pub time_s: f64,
+}
 
 /// A motion of the averaged system. The dither, if there is one, is on from the start.
 #[derive(Debug, Clone)]
@@ -44,6 +53,27 @@ impl<T: Real> Motion<T> {
             self.step();
         }
         &self.state
+    }
+
+    /// Runs as many steps as fit into `time_s`, and shows `see` each state with its time from now, s.
+    ///
+    /// # Errors
+    /// As soon as the motion leaves all physical bounds; `see` is not shown that state.
+    pub fn observe(
+        &mut self,
+        time_s: f64,
+        mut see: impl FnMut(f64, &State<T>),
+    ) -> Result<(), Diverged> {
+        let step_s = self.step_s.to_f64();
+        let steps = (time_s / step_s).round() as u64;
+        for k in 1..=steps {
+            let time_s = k as f64 * step_s;
+            if !is_bounded(self.step()) {
+                return Err(Diverged { time_s });
+            }
+            see(time_s, &self.state);
+        }
+        Ok(())
     }
 
     /// The present state.

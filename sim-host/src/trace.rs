@@ -1,14 +1,15 @@
 //! A recorded motion: states at a fixed step, and the duty codes of the PWM.
 
 use nalgebra::Vector4;
+use shared_model::Real;
 use shared_model::vehicle::State;
 
 /// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
 const BOUND: f64 = 1e3;
 
-/// Whether a state vector is one of a vehicle at all: finite, and within any bounds that one could keep.
-pub fn is_bounded(x: &Vector4<f64>) -> bool {
-    x.iter().all(|value| value.abs() < BOUND)
+/// The state is one of a vehicle, not of a motion that diverges.
+pub(crate) fn is_bounded<T: Real>(state: &State<T>) -> bool {
+    state.x.iter().all(|value| value.to_f64().abs() < BOUND)
 }
 
 /// A motion sampled at every model step.
@@ -68,7 +69,7 @@ impl Trace {
 
     /// Time at which the motion leaves all physical bounds, if it does, s.
     pub fn diverges_at_s(&self) -> Option<f64> {
-        let first = self.states.iter().position(|state| !is_bounded(&state.x))?;
+        let first = self.states.iter().position(|state| !is_bounded(state))?;
         Some(self.time_s(first))
     }
 

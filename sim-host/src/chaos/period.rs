@@ -12,9 +12,9 @@ pub const TOLERANCE: f64 = 2e-3;
 /// The same under the true dither signal, whose ripple the maxima ride on.
 pub const RIPPLE_TOLERANCE: f64 = 1e-2;
 /// Height over its surroundings at which a maximum counts, as a share of the yaw rate's range.
-const PROMINENCE: f64 = 1e-2;
+pub(super) const PROMINENCE: f64 = 1e-2;
 /// A yaw rate that varies by less than this is at rest, rad/s.
-const AT_REST_RAD_PER_S: f64 = 1e-6;
+pub(super) const AT_REST_RAD_PER_S: f64 = 1e-6;
 
 /// What a motion's maxima say.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -91,7 +91,7 @@ pub fn mean_cycle_s(trace: &Trace) -> Option<f64> {
 }
 
 /// Indices of the maxima to which `values` rise by at least `prominence`, and from which they fall by as much.
-fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
+pub(super) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
     let mut maxima = Vec::new();
     let mut rising = false;
     // The furthest point in the present direction.
@@ -118,10 +118,14 @@ fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
 /// Period of the motion from state index `from` on; maxima count as equal within `tolerance` of the yaw rate's range.
 pub fn period(trace: &Trace, from: usize, tolerance: f64) -> Period {
     let (low, high) = trace.range(YAW_RATE, from);
-    if high - low < AT_REST_RAD_PER_S {
+    period_of_maxima(&yaw_rate_maxima(trace, from), high - low, tolerance)
+}
+
+/// Period of a motion given its yaw rate's maxima (time in s, height in rad/s) and range (rad/s); as [`period`].
+pub fn period_of_maxima(maxima: &[(f64, f64)], range: f64, tolerance: f64) -> Period {
+    if range < AT_REST_RAD_PER_S {
         return Period::Equilibrium;
     }
-    let maxima = yaw_rate_maxima(trace, from);
     if maxima.len() < MIN_REPETITIONS + 1 {
         return Period::TooShort {
             maxima: maxima.len(),
@@ -129,9 +133,9 @@ pub fn period(trace: &Trace, from: usize, tolerance: f64) -> Period {
     }
     let mut least = f64::INFINITY;
     for n in 1..=MAX_PERIOD.min(maxima.len() / (MIN_REPETITIONS + 1)) {
-        let residual = residual(&maxima, n) / (high - low);
+        let residual = residual(maxima, n) / range;
         if residual <= tolerance {
-            let (time_s, time_spread_s) = cycle_time(&maxima, n);
+            let (time_s, time_spread_s) = cycle_time(maxima, n);
             return Period::Periodic {
                 maxima: n,
                 residual,

@@ -1,6 +1,8 @@
 //! One file a subcommand, and what they share: exit codes, configuration options, output files.
 
+mod averaging;
 mod config;
+mod convergence;
 mod decode;
 mod output;
 mod qemu;
@@ -37,6 +39,8 @@ struct Cli {
 enum Command {
     Verify(verify::Arguments),
     Simulate(simulate::Arguments),
+    Averaging(averaging::Arguments),
+    Convergence(convergence::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
     Qemu(qemu::Arguments),
@@ -67,6 +71,8 @@ pub fn main() -> ExitCode {
     let done = match command {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Averaging(arguments) => averaging::run(&arguments),
+        Command::Convergence(arguments) => convergence::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),

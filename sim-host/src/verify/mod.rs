@@ -31,7 +31,7 @@ pub struct Options {
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// A scenario is not valid.
-    #[error("{0}")]
+    #[error(transparent)]
     Scenario(#[from] InvalidScenario),
     /// The motion leaves all bounds, so there is nothing to compare.
     #[error("{title}: the motion diverges at {time_s} s; there is no attractor to compare on")]

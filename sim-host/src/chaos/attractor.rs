@@ -1,0 +1,227 @@
+//! What a motion ends on, and whether two motions end on the same.
+
+use crate::chaos::equilibria::Equilibrium;
+use crate::chaos::extrema::Extrema;
+use crate::chaos::lyapunov::{Exponent, largest};
+use crate::chaos::period::{Period, TOLERANCE, period_of_maxima};
+use crate::chaos::sweep::Timing;
+use crate::motion::{Diverged, Motion};
+use crate::simulate::started_at;
+use crate::trace::Trace;
+use shared_model::vehicle::{STEERING_ANGLE, State, YAW_RATE};
+use shared_model::{InvalidScenario, Scenario};
+
+/// Longest motion along which the exponent is taken, s: its states take 40 MB.
+const LONGEST_EXPONENT_S: f64 = 1000.0;
+/// Share of their joint extent that two motions' extents must have in common to be of the same attractor.
+const COMMON_PERIODIC: f64 = 0.97;
+/// The same for chaotic motions, whose extents are those of a finite time.
+const COMMON_CHAOTIC: f64 = 0.8;
+/// Distance within which two states of rest are the same, in each component (rad and rad/s).
+const SAME_REST: f64 = 1e-4;
+
+/// The kind of a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// The yaw rate varies by less than 1e-6 rad/s.
+    Equilibrium,
+    /// The maxima of the yaw rate repeat after this many, and the exponent is not positive.
+    Periodic(usize),
+    /// The maxima do not repeat, and the exponent is positive.
+    Chaos,
+    /// Maxima and exponent disagree, or the run is too short for one of them.
+    Undecided,
+    /// The motion leaves all bounds.
+    Diverges,
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Equilibrium => f.write_str("equilibrium"),
+            Self::Periodic(maxima) => write!(f, "period-{maxima}"),
+            Self::Chaos => f.write_str("chaos"),
+            Self::Undecided => f.write_str("undecided"),
+            Self::Diverges => f.write_str("diverges"),
+        }
+    }
+}
+
+/// What a motion does behind its transient.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Attractor {
+    /// Its kind.
+    pub kind: Kind,
+    /// Greatest difference of maxima one cycle apart, over the yaw rate's range: the period's uncertainty. Of a motion
+    /// without a period, the least over the periods tried.
+    pub residual: Option<f64>,
+    /// Time of a cycle, s.
+    pub cycle_s: Option<f64>,
+    /// Largest Lyapunov exponent, 1/s, where it was asked for and the run is long enough.
+    pub exponent_per_s: Option<f64>,
+    /// What the exponent must exceed to count as positive, 1/s.
+    pub exponent_threshold_per_s: Option<f64>,
+    /// Maxima of the yaw rate, rad/s, descending: those of one cycle, or all where there is none.
+    pub maxima_rad_per_s: Vec<f64>,
+    /// Least value of each component of the state.
+    pub lower: [f64; 4],
+    /// Greatest value of each component of the state.
+    pub upper: [f64; 4],
+    /// The state at the end.
+    pub end: [f64; 4],
+    /// When the motion left all bounds, s.
+    pub diverges_at_s: Option<f64>,
+}
+
+impl Attractor {
+    fn diverging(diverged: Diverged, end: &State<f64>) -> Self {
+        Self {
+            kind: Kind::Diverges,
+            residual: None,
+            cycle_s: None,
+            exponent_per_s: None,
+            exponent_threshold_per_s: None,
+            maxima_rad_per_s: Vec::new(),
+            lower: end.x.into(),
+            upper: end.x.into(),
+            end: end.x.into(),
+            diverges_at_s: Some(diverged.time_s),
+        }
+    }
+
+    /// The side of the steering angle on which it lies.
+    pub fn lobe(&self) -> &'static str {
+        match (self.lower[STEERING_ANGLE], self.upper[STEERING_ANGLE]) {
+            (low, _) if low > 0.0 => "positive",
+            (_, high) if high < 0.0 => "negative",
+            _ => "both",
+        }
+    }
+
+    /// Least and greatest yaw rate, rad/s.
+    pub fn yaw_rates_rad_per_s(&self) -> (f64, f64) {
+        (self.lower[YAW_RATE], self.upper[YAW_RATE])
+    }
+
+    /// The two are the same attractor: of the same kind, and at rest within 1e-4 of each other or in the stick band of the
+    /// same of the `equilibria`; in motion with extents in every component that have 97 % in common, 80 % without a period.
+    /// Motions that diverge are the same.
+    pub fn is_same(&self, other: &Self, equilibria: &[Equilibrium]) -> bool {
+        if self.kind != other.kind {
+            return false;
+        }
+        let common = match self.kind {
+            Kind::Diverges => return true,
+            Kind::Equilibrium => {
+                let apart = self.end.iter().zip(&other.end).map(|(a, b)| (a - b).abs());
+                let both = |e: &Equilibrium| e.holds(&self.end) && e.holds(&other.end);
+                return apart.fold(0.0, f64::max) < SAME_REST || equilibria.iter().any(both);
+            }
+            Kind::Periodic(_) => COMMON_PERIODIC,
+            Kind::Chaos | Kind::Undecided => COMMON_CHAOTIC,
+        };
+        (0..4).all(|k| {
+            let joint = self.upper[k].max(other.upper[k]) - self.lower[k].min(other.lower[k]);
+            let shared = self.upper[k].min(other.upper[k]) - self.lower[k].max(other.lower[k]);
+            shared >= common * joint
+        })
+    }
+}
+
+/// Follows the scenario's motion through its transient and says what it ends on.
+///
+/// The period is that of the yaw rate's maxima over the time observed, to 0.2 % of its range. If `with_exponent`, the
+/// largest Lyapunov exponent along the first 1000 s of it has to agree, positive only where there is no period; else a
+/// motion without period stays undecided, and one with period is taken as such.
+///
+/// # Errors
+/// If the scenario is not valid.
+pub fn attractor(
+    scenario: &Scenario<f64>,
+    timing: Timing,
+    with_exponent: bool,
+) -> Result<Attractor, InvalidScenario> {
+    let mut motion = Motion::new(scenario)?;
+    if let Err(diverged) = motion.observe(timing.transient_s, |_, _| {}) {
+        return Ok(Attractor::diverging(diverged, motion.state()));
+    }
+    let start = *motion.state();
+    let step_s = motion.step_s();
+    let mut extrema = Extrema::default();
+    let (mut lower, mut upper) = (start.x, start.x);
+    let mut states = Vec::new();
+    let seen = motion.observe(timing.observed_s, |time_s, state| {
+        extrema.push(time_s, step_s, state.x[YAW_RATE]);
+        lower = lower.zip_map(&state.x, f64::min);
+        upper = upper.zip_map(&state.x, f64::max);
+        if with_exponent && time_s <= LONGEST_EXPONENT_S {
+            states.push(*state);
+        }
+    });
+    if let Err(diverged) = seen {
+        let time_s = timing.transient_s + diverged.time_s;
+        return Ok(Attractor::diverging(Diverged { time_s }, &start));
+    }
+    let maxima = extrema.maxima();
+    let period = period_of_maxima(&maxima, extrema.range(), TOLERANCE);
+    let exponent = (with_exponent && period != Period::Equilibrium)
+        .then(|| exponent(scenario, start, step_s, states))
+        .flatten();
+    let (residual, cycle_s) = match period {
+        Period::Periodic {
+            residual, time_s, ..
+        } => (Some(residual), Some(time_s)),
+        Period::Aperiodic { residual } => (Some(residual), None),
+        Period::Equilibrium | Period::TooShort { .. } => (None, None),
+    };
+    let in_cycle = period.maxima().unwrap_or(maxima.len());
+    let mut heights: Vec<f64> = maxima.iter().take(in_cycle).map(|m| m.1).collect();
+    heights.sort_by(|a, b| b.total_cmp(a));
+    Ok(Attractor {
+        kind: kind(period, exponent, with_exponent),
+        residual,
+        cycle_s,
+        exponent_per_s: exponent.map(|e| e.per_s),
+        exponent_threshold_per_s: exponent.map(|e| e.threshold_per_s()),
+        maxima_rad_per_s: heights,
+        lower: lower.into(),
+        upper: upper.into(),
+        end: motion.state().x.into(),
+        diverges_at_s: None,
+    })
+}
+
+/// Maxima and exponent must agree.
+fn kind(period: Period, exponent: Option<Exponent>, with_exponent: bool) -> Kind {
+    let positive = exponent.map(|e| e.is_positive());
+    match period {
+        Period::Equilibrium => Kind::Equilibrium,
+        Period::Periodic { maxima, .. } if positive == Some(false) || !with_exponent => {
+            Kind::Periodic(maxima)
+        }
+        Period::Aperiodic { .. } if positive == Some(true) => Kind::Chaos,
+        _ => Kind::Undecided,
+    }
+}
+
+fn exponent(
+    scenario: &Scenario<f64>,
+    initial: State<f64>,
+    step_s: f64,
+    states: Vec<State<f64>>,
+) -> Option<Exponent> {
+    let mut scenario = started_at(scenario, &initial);
+    // As in the motion: the mean of the dither, and from the start.
+    scenario.dither.application = shared_model::dither::Application::Averaged;
+    scenario.dither.start_time_s = 0.0;
+    let trace = Trace {
+        step_s,
+        initial,
+        states,
+        duties: Vec::new(),
+        samples_per_step: scenario.samples_per_step() as usize,
+        pwm_period: 0,
+    };
+    largest(&scenario, &trace, 0)
+}

@@ -1,0 +1,156 @@
+//! Regions of a parameter in which the motion is of one kind, and their edges.
+
+use crate::chaos::attractor::{Attractor, Kind, attractor};
+use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, scenarios};
+use rayon::prelude::*;
+use shared_model::Scenario;
+
+/// The motion at one value of the parameter.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Sample {
+    /// The parameter's value.
+    pub value: f64,
+    /// What the motion ends on.
+    pub attractor: Attractor,
+}
+
+/// A change of kind, located to an interval.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Edge {
+    /// The lower end of the interval, where the motion is of the kind `below`.
+    pub lower: f64,
+    /// Its upper end, where it is of the kind `above`.
+    pub upper: f64,
+    /// Kind at the lower end.
+    pub below: Kind,
+    /// Kind at the upper end.
+    pub above: Kind,
+}
+
+impl Edge {
+    /// The middle of the interval.
+    pub fn middle(&self) -> f64 {
+        0.5 * (self.lower + self.upper)
+    }
+}
+
+/// A stretch of the parameter with one kind of motion at all values looked at.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Region {
+    /// Its lower end: the middle of an edge, or the end of the sweep.
+    pub from: f64,
+    /// Its upper end.
+    pub to: f64,
+    /// The kind of motion.
+    pub kind: Kind,
+}
+
+/// A sweep from one start.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Regions {
+    /// The values looked at, those of the bisections included, ascending.
+    pub samples: Vec<Sample>,
+    /// The edges found, ascending.
+    pub edges: Vec<Edge>,
+    /// The regions between them.
+    pub regions: Vec<Region>,
+    /// Every value was looked at, and every edge bisected to the width asked for.
+    pub complete: bool,
+}
+
+/// Classifies the motion from the scenario's start at each of the values, and bisects between neighbours of unlike kind
+/// until the edge is in an interval no wider than `width`.
+///
+/// Where the kind in the middle is neither of the two, both halves have an edge, so cascades unfold. Windows narrower than
+/// the step of the sweep between values of the same kind are not seen. Time grows with the number of values, plus
+/// log2(step/width) for each edge, times the length of a run.
+///
+/// # Errors
+/// If a value's scenario is not valid.
+pub fn regions(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    values: &Values,
+    width: f64,
+    timing: Timing,
+    watch: Watch,
+) -> Result<Regions, SweepError> {
+    let scenarios = scenarios(scenario, parameter, values)?;
+    let sample = |scenario: &Scenario<f64>| {
+        let attractor = attractor(scenario, timing, true)?;
+        let value = parameter.of(scenario);
+        Ok(Sample { value, attractor })
+    };
+    let made = watch.points(&scenarios, sample);
+    let begun = made.iter().flatten().count();
+    let coarse = made
+        .into_iter()
+        .flatten()
+        .collect::<Result<Vec<Sample>, SweepError>>()?;
+    let between = |value: f64| watch.point(|| sample(&parameter.set(scenario, value)));
+    let between = |pair: &[Sample]| refine(&pair[0], &pair[1], width, &between);
+    let finer = coarse
+        .par_windows(2)
+        .with_max_len(1)
+        .map(between)
+        .collect::<Result<Vec<_>, SweepError>>()?;
+    let mut samples = coarse;
+    samples.extend(finer.into_iter().flatten());
+    samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let edges = edges(&samples);
+    let complete = begun == values.count() && edges.iter().all(|e| e.upper - e.lower <= width);
+    Ok(Regions {
+        regions: stretches(&samples, &edges),
+        samples,
+        edges,
+        complete,
+    })
+}
+
+/// The samples that a bisection between the two adds.
+fn refine(
+    lower: &Sample,
+    upper: &Sample,
+    width: f64,
+    sample: &impl Fn(f64) -> Option<Result<Sample, SweepError>>,
+) -> Result<Vec<Sample>, SweepError> {
+    let wide = upper.value - lower.value > width;
+    if !wide || lower.attractor.kind == upper.attractor.kind {
+        return Ok(Vec::new());
+    }
+    let Some(middle) = sample(0.5 * (lower.value + upper.value)) else {
+        return Ok(Vec::new());
+    };
+    let middle = middle?;
+    let mut samples = refine(lower, &middle, width, sample)?;
+    samples.extend(refine(&middle, upper, width, sample)?);
+    samples.push(middle);
+    Ok(samples)
+}
+
+fn edges(samples: &[Sample]) -> Vec<Edge> {
+    let unlike = |pair: &[Sample]| {
+        let edge = Edge {
+            lower: pair[0].value,
+            upper: pair[1].value,
+            below: pair[0].attractor.kind,
+            above: pair[1].attractor.kind,
+        };
+        (edge.below != edge.above).then_some(edge)
+    };
+    samples.windows(2).filter_map(unlike).collect()
+}
+
+fn stretches(samples: &[Sample], edges: &[Edge]) -> Vec<Region> {
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+        return Vec::new();
+    };
+    let froms = std::iter::once(first.value).chain(edges.iter().map(Edge::middle));
+    let tos = edges
+        .iter()
+        .map(Edge::middle)
+        .chain(std::iter::once(last.value));
+    let kinds = std::iter::once(first.attractor.kind).chain(edges.iter().map(|e| e.above));
+    let stretch = |((from, to), kind)| Region { from, to, kind };
+    froms.zip(tos).zip(kinds).map(stretch).collect()
+}

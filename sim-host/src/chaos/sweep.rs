@@ -1,0 +1,270 @@
+//! What sweeps share: the parameter that is swept, its values, the times of a run, and the work on many points at once.
+
+use rayon::prelude::*;
+use shared_model::dither::Waveform;
+use shared_model::vehicle::State;
+use shared_model::{InvalidScenario, Scenario};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Most values of one range.
+const MAX_VALUES: f64 = 1e7;
+
+/// What a sweep varies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Parameter {
+    /// The wheel speed, rpm.
+    Speed,
+    /// The dither's amplitude W, V.
+    Amplitude,
+}
+
+impl Parameter {
+    /// Name with unit, as axes and messages show it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Speed => "wheel speed (rpm)",
+            Self::Amplitude => "dither amplitude (V)",
+        }
+    }
+
+    /// Unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Self::Speed => "rpm",
+            Self::Amplitude => "V",
+        }
+    }
+
+    /// The width to which an edge is located unless told otherwise: 0.5 rpm or 0.5 mV.
+    pub fn edge_width(self) -> f64 {
+        match self {
+            Self::Speed => 0.5,
+            Self::Amplitude => 0.5e-3,
+        }
+    }
+
+    /// The scenario with the parameter's value put in.
+    pub fn set(self, scenario: &Scenario<f64>, value: f64) -> Scenario<f64> {
+        let mut scenario = *scenario;
+        match self {
+            Self::Speed => scenario.run.wheel_speed_rpm = value,
+            Self::Amplitude => scenario.dither.amplitude_v = value,
+        }
+        scenario
+    }
+
+    /// The parameter's value in a scenario.
+    pub fn of(self, scenario: &Scenario<f64>) -> f64 {
+        match self {
+            Self::Speed => scenario.run.wheel_speed_rpm,
+            Self::Amplitude => scenario.dither.amplitude_v,
+        }
+    }
+}
+
+/// Why a sweep cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SweepError {
+    /// A bound or step is not finite, the step is not positive, or the bounds are reversed.
+    #[error("{what}: from {from} to {to} in steps of {step}: {fault}")]
+    Range {
+        /// What the range is of.
+        what: &'static str,
+        /// Its lower bound.
+        from: f64,
+        /// Its upper bound.
+        to: f64,
+        /// Its step.
+        step: f64,
+        /// What is wrong, with bounds.
+        fault: &'static str,
+    },
+    /// Nothing of the run is left behind the transient.
+    #[error(
+        "a run of {time_s} s with a transient of {transient_s} s: the transient must be at least 0 and shorter than the run"
+    )]
+    Timing {
+        /// Length of the whole run, s.
+        time_s: f64,
+        /// Length of the transient, s.
+        transient_s: f64,
+    },
+    /// A sweep over the amplitude of a dither that is off.
+    #[error(
+        "a sweep over the dither's amplitude needs a dither: its waveform is none, and must be square or sine"
+    )]
+    NoDither,
+    /// No motion ever crosses the section.
+    #[error(
+        "the section {component} = {level} is never crossed upwards: the motions stay from {low} to {high}"
+    )]
+    SectionNotCrossed {
+        /// The section's component, with its unit.
+        component: &'static str,
+        /// Its level.
+        level: f64,
+        /// Least value of the component on all motions.
+        low: f64,
+        /// Greatest value.
+        high: f64,
+    },
+    /// A point's scenario is not valid.
+    #[error("{0}")]
+    Scenario(#[from] InvalidScenario),
+}
+
+/// Equally spaced values.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Values {
+    from: f64,
+    step: f64,
+    count: usize,
+}
+
+impl Values {
+    /// The values from `from` to `to` in steps of `step`; `what` they are of is for the message.
+    ///
+    /// # Errors
+    /// If a number is not finite, the step is not positive, `to` is below `from`, or there are more than ten million.
+    pub fn new(what: &'static str, from: f64, to: f64, step: f64) -> Result<Self, SweepError> {
+        let refuse = |fault| {
+            Err(SweepError::Range {
+                what,
+                from,
+                to,
+                step,
+                fault,
+            })
+        };
+        if ![from, to, step].iter().all(|value| value.is_finite()) {
+            return refuse("all three must be finite numbers");
+        }
+        if step <= 0.0 {
+            return refuse("the step must be greater than 0");
+        }
+        if to < from {
+            return refuse("the range is reversed; the upper bound must be at least the lower one");
+        }
+        // A bound that rounding puts just out of reach belongs to the range.
+        let count = ((to - from) / step + 1e-9).floor() + 1.0;
+        if count > MAX_VALUES {
+            return refuse("these are more than ten million values");
+        }
+        Ok(Self {
+            from,
+            step,
+            count: count as usize,
+        })
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// The values, ascending.
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = f64> + '_ {
+        (0..self.count).map(|k| self.from + k as f64 * self.step)
+    }
+}
+
+/// Length of a run and of the transient in it, s.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Timing {
+    /// What passes before the motion is looked at, s.
+    pub transient_s: f64,
+    /// What is looked at, s.
+    pub observed_s: f64,
+}
+
+impl Timing {
+    /// A run of `time_s`, of which the first `transient_s` are not looked at.
+    ///
+    /// # Errors
+    /// If nothing is left.
+    pub fn new(transient_s: f64, time_s: f64) -> Result<Self, SweepError> {
+        if transient_s >= 0.0 && transient_s < time_s && time_s.is_finite() {
+            return Ok(Self {
+                transient_s,
+                observed_s: time_s - transient_s,
+            });
+        }
+        Err(SweepError::Timing {
+            time_s,
+            transient_s,
+        })
+    }
+
+    /// Length of the whole run, s.
+    pub fn time_s(&self) -> f64 {
+        self.transient_s + self.observed_s
+    }
+}
+
+/// The scenarios of a sweep, each checked.
+///
+/// # Errors
+/// If one is not valid, or the amplitude of no dither is to be swept.
+pub fn scenarios(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    values: &Values,
+) -> Result<Vec<Scenario<f64>>, SweepError> {
+    if parameter == Parameter::Amplitude && scenario.dither.waveform == Waveform::None {
+        return Err(SweepError::NoDither);
+    }
+    let point = |value| {
+        let point = parameter.set(scenario, value);
+        point.validate()?;
+        Ok(point)
+    };
+    values.iter().map(point).collect()
+}
+
+/// The start with the opposite signs: on the other lobe.
+pub fn mirrored(scenario: &Scenario<f64>) -> Scenario<f64> {
+    let run = &scenario.run;
+    let state = State {
+        x: -nalgebra::Vector4::new(
+            run.sideslip_rad,
+            run.yaw_rate_rad_per_s,
+            run.steering_angle_rad,
+            run.steering_rate_rad_per_s,
+        ),
+        friction: shared_model::friction::FrictionMode::Sticking,
+    };
+    crate::simulate::started_at(scenario, &state)
+}
+
+/// Someone who looks on: may ask to stop, and hears of each point that is done.
+#[derive(Clone, Copy)]
+pub struct Watch<'a> {
+    /// Set when no further point is to be begun.
+    pub stop: &'a AtomicBool,
+    /// Called behind each point.
+    pub done: &'a (dyn Fn() + Sync),
+}
+
+impl Watch<'_> {
+    /// The result of `work`, unless no point is to be begun any more.
+    pub fn point<R>(&self, work: impl FnOnce() -> R) -> Option<R> {
+        if self.stop.load(Ordering::Relaxed) {
+            return None;
+        }
+        let result = work();
+        (self.done)();
+        Some(result)
+    }
+
+    /// Independent work on many items at once. Results are in the items' order whatever the number of threads; items that
+    /// were not begun have none.
+    pub fn points<T: Sync, R: Send>(
+        &self,
+        items: &[T],
+        work: impl Fn(&T) -> R + Sync,
+    ) -> Vec<Option<R>> {
+        let one = |item| self.point(|| work(item));
+        items.par_iter().with_max_len(1).map(one).collect()
+    }
+}

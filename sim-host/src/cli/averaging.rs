@@ -1,0 +1,107 @@
+//! `sim-host averaging`: the true dither signal against the averaged system.
+
+use super::output::Destinations;
+use super::{Done, RunOptions};
+use anyhow::ensure;
+use shared_model::dither::Waveform;
+use sim_host::averaging::{Comparison, compare};
+use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+
+/// The true dither signal against the averaged system, over the dither's frequency: where averaging starts to hold.
+///
+/// Each motion runs 20 s of transient and 40 s that are compared, behind 200 s without dither.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host averaging --dither square --amplitude-v 0.1
+  sim-host averaging --dither sine --amplitude-v 1 --from 200 --to 20000 --points 30 --figure averaging.svg")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Least frequency, rad/s
+    #[arg(long, value_name = "RAD_PER_S", default_value_t = 200.0)]
+    from: f64,
+    /// Greatest frequency, rad/s
+    #[arg(long, value_name = "RAD_PER_S", default_value_t = 20_000.0)]
+    to: f64,
+    /// Number of frequencies, evenly spaced in their logarithm
+    #[arg(long, value_name = "NUMBER", default_value_t = 13)]
+    points: u32,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+/// Slower dither is no faster than the motion; faster needs a PWM rate that no timer has.
+const FREQUENCIES_RAD_PER_S: std::ops::RangeInclusive<f64> = 50.0..=100_000.0;
+const POINTS: std::ops::RangeInclusive<u32> = 2..=200;
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let (from, to, points) = (arguments.from, arguments.to, arguments.points);
+    let allowed = &FREQUENCIES_RAD_PER_S;
+    ensure!(
+        allowed.contains(&from) && allowed.contains(&to) && from < to,
+        "--from {from} --to {to}: must be rising, from {} to {} rad/s",
+        allowed.start(),
+        allowed.end()
+    );
+    ensure!(
+        POINTS.contains(&points),
+        "--points {points}: must be from {} to {}",
+        POINTS.start(),
+        POINTS.end()
+    );
+    let scenario = arguments.run.scenario()?;
+    ensure!(
+        scenario.dither.waveform != Waveform::None && scenario.dither.amplitude_v > 0.0,
+        "there is no dither to average: give --dither square or sine, and --amplitude-v"
+    );
+    arguments.destinations.check_free()?;
+    let ratio = (to / from).ln() / f64::from(points - 1);
+    let frequencies: Vec<f64> = (0..points)
+        .map(|k| from * (ratio * f64::from(k)).exp())
+        .collect();
+    let comparisons = compare(&scenario, &frequencies)?;
+    show(&comparisons);
+    arguments
+        .destinations
+        .write(&comparisons, &comparisons, || chart(&comparisons).svg())?;
+    Ok(Done::Well)
+}
+
+fn show(comparisons: &[Comparison]) {
+    let percent = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.4}"));
+    let count = |period: Option<usize>| period.map_or("none".into(), |n| n.to_string());
+    println!("rad/s     period  averaged  cycle (%)  swing (%)");
+    for comparison in comparisons {
+        println!(
+            "{:<9.1} {:<7} {:<9} {:>9}  {:>9}",
+            comparison.frequency_rad_per_s,
+            count(comparison.period),
+            count(comparison.averaged_period),
+            percent(comparison.cycle_difference_percent),
+            percent(comparison.swing_difference_percent)
+        );
+    }
+}
+
+fn chart(comparisons: &[Comparison]) -> Chart {
+    let series = |label: &str, line, value: fn(&Comparison) -> Option<f64>| Series {
+        label: label.into(),
+        points: comparisons
+            .iter()
+            .filter_map(|c| Some((c.frequency_rad_per_s, value(c)?.abs())))
+            .collect(),
+        look: Look::Line(line),
+    };
+    Chart {
+        heading: "Averaging: the true dither signal against the averaged system".into(),
+        panels: vec![Panel {
+            x: AxisSpec::logarithmic("dither frequency (rad/s)"),
+            y: AxisSpec::logarithmic("difference (%)"),
+            series: vec![
+                series("cycle time", 0, |c| c.cycle_difference_percent),
+                series("swing of the yaw rate", 1, |c| c.swing_difference_percent),
+            ],
+            ..Panel::default()
+        }],
+    }
+}

@@ -1,0 +1,68 @@
+//! `sim-host convergence`: the fixed step against the reference integrator.
+
+use super::output::Destinations;
+use super::{Done, RunOptions};
+use anyhow::ensure;
+use sim_host::convergence::{Error, errors};
+use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+
+/// Error of the ECU's fixed step against the reference integrator, over the length of the step.
+///
+/// From the scenario's start, its dither on from time 0. The reference finds friction events to 1e-12 s. In chaos every error
+/// grows: compare over a few seconds.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host convergence                              the paper's vehicle over 4 s, friction events included
+  sim-host convergence --dither sine --amplitude-v 1 --figure convergence.svg")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: RunOptions,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+/// Length of the motion unless `--time` says otherwise, s; and the most after which an error still says anything.
+const TIME_S: f64 = 4.0;
+const TIMES_S: std::ops::RangeInclusive<f64> = 0.01..=60.0;
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenario = arguments.run.scenario()?;
+    let time_s = arguments.run.time.unwrap_or(TIME_S);
+    ensure!(
+        TIMES_S.contains(&time_s),
+        "--time {time_s}: must be from {} to {} s",
+        TIMES_S.start(),
+        TIMES_S.end()
+    );
+    arguments.destinations.check_free()?;
+    let errors = errors(&scenario, time_s)?;
+    println!("{:>10}  {:>10}  {:>6}", "step (s)", "error", "order");
+    for error in &errors {
+        let order = error
+            .order
+            .map_or(String::new(), |order| format!("{order:.2}"));
+        println!("{:>10}  {:>10.2e}  {order:>6}", error.step_s, error.error);
+    }
+    arguments
+        .destinations
+        .write(&errors, &errors, || chart(&errors, time_s).svg())?;
+    Ok(Done::Well)
+}
+
+fn chart(errors: &[Error], time_s: f64) -> Chart {
+    let points = errors.iter().map(|error| (error.step_s, error.error));
+    Chart {
+        heading: "Fixed step against the reference integrator".into(),
+        panels: vec![Panel {
+            caption: format!("greatest error of a component after {time_s} s"),
+            x: AxisSpec::logarithmic("step (s)"),
+            y: AxisSpec::logarithmic("error (rad, rad/s)"),
+            series: vec![Series {
+                label: "fixed step".into(),
+                points: points.collect(),
+                look: Look::Line(0),
+            }],
+            ..Panel::default()
+        }],
+    }
+}
