@@ -68,7 +68,7 @@ impl<T: Real> Motion<T> {
         let steps = (time_s / step_s).round() as u64;
         for k in 1..=steps {
             let time_s = k as f64 * step_s;
-            if !is_bounded(self.step()) {
+            if !is_bounded(&self.step().x) {
                 return Err(Diverged { time_s });
             }
             see(time_s, &self.state);

@@ -1,6 +1,6 @@
 //! The paper's claims and its errata, as data: S.-C. Chang, "On controlling a chaotic vehicle dynamic system by using dither".
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A claim of the paper, in this project's words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -61,7 +61,7 @@ pub const CLAIMS: [Claim; 8] = [
 pub const REGION_EDGES_RPM: [f64; 3] = [1645.0, 1825.0, 1855.0];
 
 /// How far a claim was found to hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reproduced {
     /// It holds within the measurement's uncertainty, or an edge is within 1 % of the paper's.

@@ -7,9 +7,9 @@ use shared_model::vehicle::State;
 /// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
 const BOUND: f64 = 1e3;
 
-/// The state is one of a vehicle, not of a motion that diverges.
-pub(crate) fn is_bounded<T: Real>(state: &State<T>) -> bool {
-    state.x.iter().all(|value| value.to_f64().abs() < BOUND)
+/// Whether a state vector is one of a vehicle at all: finite, and within any bounds that one could keep.
+pub fn is_bounded<T: Real>(x: &Vector4<T>) -> bool {
+    x.iter().all(|value| value.to_f64().abs() < BOUND)
 }
 
 /// A motion sampled at every model step.
@@ -69,7 +69,7 @@ impl Trace {
 
     /// Time at which the motion leaves all physical bounds, if it does, s.
     pub fn diverges_at_s(&self) -> Option<f64> {
-        let first = self.states.iter().position(|state| !is_bounded(state))?;
+        let first = self.states.iter().position(|state| !is_bounded(&state.x))?;
         Some(self.time_s(first))
     }
 

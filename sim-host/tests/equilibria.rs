@@ -28,12 +28,31 @@ fn at(rpm: f64, law: FrictionLaw) -> Scenario<f64> {
 #[test]
 fn explore() {
     for rpm in [1000.0, 1750.0] {
-        for law in [FrictionLaw::None, FrictionLaw::CoulombRate, FrictionLaw::PrintedAngle] {
+        for law in [
+            FrictionLaw::None,
+            FrictionLaw::CoulombRate,
+            FrictionLaw::PrintedAngle,
+        ] {
             println!("== {rpm} {law:?}");
             for e in find(&at(rpm, law)).unwrap() {
-                println!("{:?} res {:.1e} stable {} slips {:?}", e.state, e.residual, e.stable, e.slip_angles_rad);
-                println!("   {}", e.eigenvalues_per_s.iter().map(|e| e.to_string()).collect::<Vec<_>>().join("; "));
-                if let Some(b) = e.stick_band { println!("   band {:?} {:?} {} {}", b.lower, b.upper, b.eigenvalues_per_s[0], b.stable); }
+                println!(
+                    "{:?} res {:.1e} stable {} slips {:?}",
+                    e.state, e.residual, e.stable, e.slip_angles_rad
+                );
+                println!(
+                    "   {}",
+                    e.eigenvalues_per_s
+                        .iter()
+                        .map(|e| e.to_string())
+                        .collect::<Vec<_>>()
+                        .join("; ")
+                );
+                if let Some(b) = e.stick_band {
+                    println!(
+                        "   band {:?} {:?} {} {}",
+                        b.lower, b.upper, b.eigenvalues_per_s[0], b.stable
+                    );
+                }
             }
         }
     }
@@ -42,6 +61,8 @@ fn explore() {
     let s = at(1000.0, FrictionLaw::None);
     let all = over_speed(&s, &speeds, WATCH).unwrap();
     println!("{:?}", t.elapsed());
-    for h in hopf(&s, &all).unwrap() { println!("{h:?}"); }
+    for h in hopf(&s, &all).unwrap() {
+        println!("{h:?}");
+    }
     println!("{:?}", t.elapsed());
 }

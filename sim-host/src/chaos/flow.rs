@@ -4,7 +4,6 @@ use crate::motion::Motion;
 use crate::trace::is_bounded;
 use nalgebra::{SVector, Vector4};
 use shared_model::dither::Injection;
-use shared_model::friction::FrictionMode;
 use shared_model::vehicle::{Model, State};
 use shared_model::{InvalidScenario, Real, Scenario, integrate};
 
@@ -134,7 +133,10 @@ impl Flow<4> for VehicleFlow {
         // The constants are carried over each time: some forty moves beside thousands of operations.
         let model = self.model.map(&T::from_f64);
         let injection = self.injection.map(T::from_f64);
-        let mut state = state(x);
+        let mut state = State {
+            x: *x,
+            friction: shared_model::friction::FrictionMode::Neutral,
+        };
         integrate::step(&model, &mut state, T::from_f64(self.step_s), injection);
         state.x
     }
@@ -144,14 +146,6 @@ impl Flow<4> for VehicleFlow {
     }
 
     fn contains(&self, x: &Vector4<f64>) -> bool {
-        is_bounded(&state(x))
-    }
-}
-
-/// The state with the given vector. The mode is one that no step reads.
-fn state<T: Real>(x: &Vector4<T>) -> State<T> {
-    State {
-        x: *x,
-        friction: FrictionMode::Neutral,
+        is_bounded(x)
     }
 }

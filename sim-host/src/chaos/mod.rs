@@ -1,13 +1,16 @@
-//! Measures of chaos: Lyapunov exponents by three independent methods, the period, attractors and what becomes of them along a
+//! Measures of chaos: Lyapunov exponents by three independent methods, the period, attractors, and what becomes of them along a
 //! parameter.
 //!
 //! | question | module |
 //! |---|---|
-//! | what is a motion to the exponents' methods? | [`flow`] |
+//! | what is a motion to the methods? | [`flow`] |
 //! | exponents by tangent dynamics, the largest one or all | [`lyapunov`] |
 //! | the largest exponent by two neighbouring motions | [`twin`] |
 //! | the largest exponent by synchronisation, the paper's method | [`synchronisation`] |
-//! | one of these methods by its name, along a sweep | [`method`] |
+//! | which period has a motion? | [`period`], [`extrema`] |
+//! | what does a motion end on? | [`attractor`], [`basin`] |
+//! | what becomes of it along a parameter? | [`orbit`], [`regions`], [`sweep`] |
+//! | where can it rest, and is that stable? | [`equilibria`], [`polynomial`] |
 
 pub mod attractor;
 pub mod basin;

@@ -6,6 +6,7 @@ mod convergence;
 mod decode;
 mod output;
 mod qemu;
+mod reproduce;
 mod simulate;
 mod verify;
 
@@ -39,6 +40,7 @@ struct Cli {
 enum Command {
     Verify(verify::Arguments),
     Simulate(simulate::Arguments),
+    Reproduce(reproduce::Arguments),
     Averaging(averaging::Arguments),
     Convergence(convergence::Arguments),
     Config(config::Arguments),
@@ -71,6 +73,7 @@ pub fn main() -> ExitCode {
     let done = match command {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Reproduce(arguments) => reproduce::run(&arguments),
         Command::Averaging(arguments) => averaging::run(&arguments),
         Command::Convergence(arguments) => convergence::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),

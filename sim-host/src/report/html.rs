@@ -6,42 +6,48 @@ use super::text::{by_run, counts, limit, measured, run_of, status_word};
 use crate::verdict::{Check, Status};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
-/// The page: verdict, checks, notes, figures.
-pub fn page(input: &ReportInput, figures: &[Figure]) -> Markup {
+/// A page with the common style.
+pub fn document(title: &str, body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (input.title) }
+                title { (title) }
                 style { (PreEscaped(STYLE)) }
             }
-            body {
-                h1 { (input.title) }
-                (banner(input))
-                (not_passed(input))
-                nav {
-                    a href="#checks" { "Checks" }
-                    @if !input.notes.is_empty() { a href="#notes" { "Notes" } }
-                    a href="#figures" { "Figures" }
-                }
-                h2 #checks { "Checks" }
-                (checks(input))
-                @if !input.notes.is_empty() {
-                    h2 #notes { "Notes" }
-                    (notes(input.notes))
-                }
-                h2 #figures { "Figures" }
-                @for figure in figures {
-                    figure id=(figure.name) {
-                        div.drawing { (PreEscaped(&figure.svg)) }
-                        figcaption { (figure.caption) }
-                    }
-                }
-            }
+            body { (body) }
         }
     }
+}
+
+/// The page: verdict, checks, notes, figures.
+pub fn page(input: &ReportInput, figures: &[Figure]) -> Markup {
+    let body = html! {
+        h1 { (input.title) }
+        (banner(input))
+        (not_passed(input))
+        nav {
+            a href="#checks" { "Checks" }
+            @if !input.notes.is_empty() { a href="#notes" { "Notes" } }
+            a href="#figures" { "Figures" }
+        }
+        h2 #checks { "Checks" }
+        (checks(input))
+        @if !input.notes.is_empty() {
+            h2 #notes { "Notes" }
+            (notes(input.notes))
+        }
+        h2 #figures { "Figures" }
+        @for figure in figures {
+            figure id=(figure.name) {
+                div.drawing { (PreEscaped(&figure.svg)) }
+                figcaption { (figure.caption) }
+            }
+        }
+    };
+    document(input.title, &body)
 }
 
 fn banner(input: &ReportInput) -> Markup {

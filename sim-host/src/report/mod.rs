@@ -2,8 +2,8 @@
 
 pub mod chart;
 mod figure;
-mod file;
-mod html;
+pub(crate) mod file;
+pub(crate) mod html;
 mod junit;
 #[cfg(test)]
 mod sample;

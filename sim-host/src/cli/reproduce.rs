@@ -1,0 +1,120 @@
+//! `sim-host reproduce`: the paper's figures and claims.
+
+use super::Done;
+use indicatif::{ProgressBar, ProgressStyle};
+use shared_model::settings::Choice;
+use shared_model::{Preset, Scenario};
+use sim_host::config::{load, validate};
+use sim_host::pil::qemu::INTERRUPTED;
+use sim_host::reproduce::{Judgement, Options, Progress, Quality, Summary, reproduce};
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Reproduce the paper: draw its figures, judge its claims under both presets, show what the print gets wrong, and write one page.
+///
+/// What is done is kept: after Ctrl-C the same command goes on where it stopped. With another vehicle's file, that vehicle is
+/// judged instead of the presets.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host reproduce --quick                        a look at everything in seconds
+  sim-host reproduce                                full quality, in target/reproduction
+  sim-host reproduce --config vehicle.toml --out target/vehicle")]
+pub struct Arguments {
+    /// Coarse sweeps and short runs
+    #[arg(long)]
+    quick: bool,
+    /// TOML file of another vehicle, instead of both presets
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Folder for page, figures and data
+    #[arg(long, value_name = "FOLDER", default_value = "target/reproduction")]
+    out: PathBuf,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let options = Options {
+        quality: if arguments.quick {
+            Quality::Quick
+        } else {
+            Quality::Full
+        },
+        scenarios: scenarios(arguments)?,
+    };
+    let start = Instant::now();
+    let bar = ProgressBar::no_length().with_style(
+        ProgressStyle::with_template("{elapsed_precise} {spinner} {msg}, {pos} points")
+            .expect("the template is valid"),
+    );
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let summary = reproduce(
+        &arguments.out,
+        &options,
+        &INTERRUPTED,
+        &|progress| match progress {
+            Progress::Begins {
+                number,
+                of,
+                title,
+                kept,
+            } => {
+                let line = format!("{number}/{of} {title}{}", if kept { ": kept" } else { "" });
+                bar.set_position(0);
+                bar.set_message(line.clone());
+                if bar.is_hidden() {
+                    eprintln!("[{:5.1} s] {line}", start.elapsed().as_secs_f64());
+                }
+            }
+            Progress::Point => bar.inc(1),
+        },
+    )?;
+    bar.finish_and_clear();
+    show(&summary);
+    let page = arguments.out.join("index.html");
+    anyhow::ensure!(
+        summary.complete,
+        "stopped; what is done is in {}, and the same command goes on from there",
+        page.display()
+    );
+    println!(
+        "page: {} ({:.0} s)",
+        page.display(),
+        start.elapsed().as_secs_f64()
+    );
+    Ok(Done::Well)
+}
+
+fn scenarios(arguments: &Arguments) -> anyhow::Result<Vec<(String, Scenario<f64>)>> {
+    if let Some(file) = &arguments.config {
+        let scenario = load(Some(file), None)?;
+        validate(&scenario)?;
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        let plain = |c: char| {
+            if c.is_ascii_alphanumeric() {
+                c.to_ascii_lowercase()
+            } else {
+                '-'
+            }
+        };
+        return Ok(vec![(stem.chars().map(plain).collect(), scenario)]);
+    }
+    let presets = Preset::ALL.iter();
+    Ok(presets
+        .map(|&(name, preset)| (name.into(), Scenario::preset(preset)))
+        .collect())
+}
+
+fn show(summary: &Summary) {
+    for Judgement {
+        claim,
+        preset,
+        measured,
+        distance,
+        verdict,
+    } in &summary.judgements
+    {
+        println!("{claim} {preset:<15} {:<19} {measured}", verdict.words());
+        if !distance.is_empty() {
+            println!("{:38} {distance}", "");
+        }
+    }
+}

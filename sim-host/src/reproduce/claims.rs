@@ -1,0 +1,242 @@
+//! The paper's claims held against what was measured.
+
+use crate::chaos::attractor::Kind;
+use crate::chaos::regions::{Regions, Sample};
+use crate::paper::{CLAIMS, REGION_EDGES_RPM, Reproduced};
+use serde::{Deserialize, Serialize};
+
+/// A claim with its judgement under one preset.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Judgement {
+    /// The claim's number.
+    pub claim: String,
+    /// The preset.
+    pub preset: String,
+    /// What was measured, with its uncertainty.
+    pub measured: String,
+    /// How far that is from the claim.
+    pub distance: String,
+    /// The verdict.
+    pub verdict: Reproduced,
+}
+
+/// A region's edge counts as the paper's within 1 % of it.
+const EDGE_SHARE: f64 = 0.01;
+/// Share of a claimed range in which the claimed kind must be found; periodic windows in chaos are no contradiction.
+const MOST: f64 = 0.8;
+const SOME: f64 = 0.4;
+
+/// Judges C1 to C4 by a sweep over the speed.
+pub fn of_speeds(preset: &str, sweep: &Regions) -> Vec<Judgement> {
+    let [first, second, third] = REGION_EDGES_RPM;
+    let ends = (
+        sweep.samples.first().map_or(first, |sample| sample.value),
+        sweep.samples.last().map_or(third, |sample| sample.value),
+    );
+    let ranges = [
+        ("C1", ends.0, first, Kind::Periodic(2)),
+        ("C2", first, second, Kind::Chaos),
+        ("C3", second, third, Kind::Periodic(3)),
+        ("C4", third, ends.1, Kind::Chaos),
+    ];
+    let judge = |(claim, from, to, kind): (&str, f64, f64, Kind)| {
+        let share = share(sweep, from, to, |k| k == kind);
+        let edges: Vec<_> = [from, to]
+            .into_iter()
+            .filter(|edge| REGION_EDGES_RPM.contains(edge))
+            .map(|edge| (edge, nearest_edge(sweep, edge, kind)))
+            .collect();
+        let near = |(claimed, found): &(f64, Option<(f64, f64)>)| {
+            found.is_some_and(|(middle, _)| (middle - claimed).abs() <= EDGE_SHARE * claimed)
+        };
+        let verdict = if share >= MOST && edges.iter().all(near) {
+            Reproduced::Yes
+        } else if share >= SOME {
+            Reproduced::InPart
+        } else {
+            Reproduced::No
+        };
+        Judgement {
+            claim: claim.into(),
+            preset: preset.into(),
+            measured: format!(
+                "{kind} in {:.0} % of {from:.0} to {to:.0} rpm{}",
+                100.0 * share,
+                exponents(sweep, from, to, kind)
+            ),
+            distance: edges
+                .iter()
+                .map(edge_distance)
+                .collect::<Vec<_>>()
+                .join("; "),
+            verdict,
+        }
+    };
+    ranges.into_iter().map(judge).collect()
+}
+
+/// Judges C5 and C6 by a sweep over the amplitude of the square dither at 1750 rpm.
+pub fn of_square_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
+    let start = kind_at(sweep, 0.0);
+    let end = kind_at(sweep, 0.14);
+    let chaotic_at_first = start == Some(Kind::Chaos);
+    let tamed = end.is_some_and(|kind| matches!(kind, Kind::Periodic(_) | Kind::Equilibrium));
+    let periodic = matches!(end, Some(Kind::Periodic(_)));
+    let last_chaos = sweep
+        .edges
+        .iter()
+        .rev()
+        .find(|edge| edge.below == Kind::Chaos);
+    let at = kind_at(sweep, 0.1);
+    vec![
+        Judgement {
+            claim: "C5".into(),
+            preset: preset.into(),
+            measured: format!("{} at 0 V, {} at 0.14 V", name(start), name(end)),
+            distance: last_chaos.map_or_else(String::new, |edge| {
+                format!(
+                    "chaos ends at {:.4} \u{b1} {:.4} V",
+                    edge.middle(),
+                    0.5 * (edge.upper - edge.lower)
+                )
+            }),
+            verdict: match (chaotic_at_first, tamed, periodic) {
+                (true, true, true) => Reproduced::Yes,
+                (true, true, false) => Reproduced::InPart,
+                _ => Reproduced::No,
+            },
+        },
+        Judgement {
+            claim: "C6".into(),
+            preset: preset.into(),
+            measured: format!("{} at 0.1 V", name(at)),
+            distance: String::new(),
+            verdict: yes_if(at == Some(Kind::Periodic(1))),
+        },
+    ]
+}
+
+/// Judges C7 and C8 by a sweep over the amplitude of the sine dither at 1750 rpm.
+pub fn of_sine_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
+    let share = share(sweep, 0.8, 1.2, |kind| kind == Kind::Periodic(1));
+    let ones = |edge: &&crate::chaos::regions::Edge| {
+        edge.above == Kind::Periodic(1) || edge.below == Kind::Periodic(1)
+    };
+    let edges: Vec<String> = sweep
+        .edges
+        .iter()
+        .filter(ones)
+        .map(|edge| format!("{:.4} V", edge.middle()))
+        .collect();
+    let (before, after) = (kind_at(sweep, 0.0), kind_at(sweep, 1.0));
+    let chaos = before == Some(Kind::Chaos);
+    let periodic = matches!(after, Some(Kind::Periodic(_)));
+    vec![
+        Judgement {
+            claim: "C7".into(),
+            preset: preset.into(),
+            measured: format!("period-1 in {:.0} % of 0.8 to 1.2 V", 100.0 * share),
+            distance: if edges.is_empty() {
+                "no edge of period-1 in the sweep".into()
+            } else {
+                format!(
+                    "period-1 begins or ends at {} (\u{b1} 0.25 mV)",
+                    edges.join(", ")
+                )
+            },
+            verdict: match share {
+                share if share > 0.999 => Reproduced::Yes,
+                share if share >= SOME => Reproduced::InPart,
+                _ => Reproduced::No,
+            },
+        },
+        Judgement {
+            claim: "C8".into(),
+            preset: preset.into(),
+            measured: format!("{} before, {} at 1.0 V", name(before), name(after)),
+            distance: String::new(),
+            verdict: match (chaos, periodic) {
+                (true, true) => Reproduced::Yes,
+                (false, true) | (true, false) => Reproduced::InPart,
+                _ => Reproduced::No,
+            },
+        },
+    ]
+}
+
+fn yes_if(holds: bool) -> Reproduced {
+    if holds {
+        Reproduced::Yes
+    } else {
+        Reproduced::No
+    }
+}
+
+fn name(kind: Option<Kind>) -> String {
+    kind.map_or_else(|| "not looked at".into(), |kind| kind.to_string())
+}
+
+/// The kind at the sample nearest to a value.
+fn kind_at(sweep: &Regions, value: f64) -> Option<Kind> {
+    let apart = |sample: &&Sample| (sample.value - value).abs();
+    let nearest = sweep
+        .samples
+        .iter()
+        .min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    Some(nearest.attractor.kind)
+}
+
+/// Share of a range that regions of the wanted kinds take.
+fn share(sweep: &Regions, from: f64, to: f64, wanted: impl Fn(Kind) -> bool) -> f64 {
+    let overlap = |region: &crate::chaos::regions::Region| {
+        (region.to.min(to) - region.from.max(from)).max(0.0)
+    };
+    let held = sweep.regions.iter().filter(|region| wanted(region.kind));
+    held.map(overlap).sum::<f64>() / (to - from)
+}
+
+/// Middle and half width of the edge of a region of the given kind that is nearest to `claimed`.
+fn nearest_edge(sweep: &Regions, claimed: f64, kind: Kind) -> Option<(f64, f64)> {
+    let of_kind = sweep
+        .edges
+        .iter()
+        .filter(|edge| edge.below == kind || edge.above == kind);
+    let apart = |edge: &&crate::chaos::regions::Edge| (edge.middle() - claimed).abs();
+    let nearest = of_kind.min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    Some((nearest.middle(), 0.5 * (nearest.upper - nearest.lower)))
+}
+
+fn edge_distance((claimed, found): &(f64, Option<(f64, f64)>)) -> String {
+    match found {
+        Some((middle, half)) => format!(
+            "edge at {middle:.1} \u{b1} {half:.1} rpm, {:+.1} from {claimed:.0}",
+            middle - claimed
+        ),
+        None => format!("no edge near {claimed:.0}"),
+    }
+}
+
+/// Range of the exponents in a chaotic range.
+fn exponents(sweep: &Regions, from: f64, to: f64, kind: Kind) -> String {
+    if kind != Kind::Chaos {
+        return String::new();
+    }
+    let inside = sweep
+        .samples
+        .iter()
+        .filter(|s| s.value >= from && s.value <= to && s.attractor.kind == Kind::Chaos);
+    let rates = inside.filter_map(|sample| sample.attractor.exponent_per_s);
+    let (low, high) = rates.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), rate| {
+        (low.min(rate), high.max(rate))
+    });
+    if low > high {
+        return String::new();
+    }
+    format!(", exponent {low:.2} to {high:.2} 1/s there")
+}
+
+/// The claim's own words.
+pub fn says(claim: &str) -> (&'static str, &'static str) {
+    let known = CLAIMS.iter().find(|known| known.id == claim);
+    known.map_or(("", ""), |known| (known.says, known.place))
+}

@@ -1,0 +1,131 @@
+//! The paper reproduced: its figures, its claims, and what it leaves out, as pieces that are made one after the other, kept when
+//! they are done, and not made again.
+
+mod claims;
+mod errata;
+mod figures;
+mod page;
+mod piece;
+mod sweeps;
+
+pub use claims::Judgement;
+
+use crate::chaos::sweep::{SweepError, Watch};
+use anyhow::Context;
+use piece::{Piece, Product};
+use shared_model::Scenario;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// How finely to look.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quality {
+    /// Coarse sweeps and short runs: a look at everything in seconds.
+    Quick,
+    /// As the claims need.
+    Full,
+}
+
+/// What to reproduce, and how.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// How finely to look.
+    pub quality: Quality,
+    /// Preset or vehicle, by name; each is judged by itself.
+    pub scenarios: Vec<(String, Scenario<f64>)>,
+}
+
+/// How far the reproduction is.
+#[derive(Debug, Clone)]
+pub enum Progress {
+    /// That piece of so many begins.
+    Begins {
+        /// Its number, from 1.
+        number: usize,
+        /// How many there are.
+        of: usize,
+        /// What it is.
+        title: String,
+        /// It was made by an earlier run and is kept.
+        kept: bool,
+    },
+    /// A point of the present piece is done.
+    Point,
+}
+
+/// What came out.
+#[derive(Debug)]
+pub struct Summary {
+    /// All judgements, by claim and preset.
+    pub judgements: Vec<Judgement>,
+    /// Everything was made; otherwise the user has stopped it, and another run goes on from here.
+    pub complete: bool,
+}
+
+/// Makes what is not yet in `folder`, and the page over all of it.
+///
+/// # Errors
+/// If a file cannot be written or a scenario is not valid.
+pub fn reproduce(
+    folder: &Path,
+    options: &Options,
+    stop: &AtomicBool,
+    on_progress: &(dyn Fn(Progress) + Sync),
+) -> anyhow::Result<Summary> {
+    let pieces = piece::all(options);
+    let of = pieces.len();
+    let mut products = Vec::with_capacity(of);
+    for (k, piece) in pieces.iter().enumerate() {
+        let kept = piece.kept(folder, options);
+        on_progress(Progress::Begins {
+            number: k + 1,
+            of,
+            title: piece.title.clone(),
+            kept: kept.is_some(),
+        });
+        let product = match kept {
+            Some(product) => product,
+            None => match make(piece, folder, options, stop, on_progress)? {
+                Some(product) => product,
+                None => break,
+            },
+        };
+        products.push(product);
+    }
+    let mut judgements: Vec<Judgement> = products
+        .iter()
+        .flat_map(|product: &Product| product.judgements.clone())
+        .collect();
+    judgements.sort_by(|a, b| a.claim.cmp(&b.claim));
+    page::write(folder, options, &products, &judgements)?;
+    Ok(Summary {
+        judgements,
+        complete: products.len() == of,
+    })
+}
+
+/// The piece's product, written to the folder; none if it was stopped before it was complete.
+fn make(
+    piece: &Piece,
+    folder: &Path,
+    options: &Options,
+    stop: &AtomicBool,
+    on_progress: &(dyn Fn(Progress) + Sync),
+) -> anyhow::Result<Option<Product>> {
+    if stop.load(Ordering::Relaxed) {
+        return Ok(None);
+    }
+    let done = || on_progress(Progress::Point);
+    let watch = Watch { stop, done: &done };
+    let made = (piece.make)(&piece.scenario, options.quality, watch);
+    let made = made.with_context(|| format!("{} cannot be made", piece.title))?;
+    // Half a sweep is not a piece: another run makes it anew.
+    if stop.load(Ordering::Relaxed) {
+        return Ok(None);
+    }
+    Ok(Some(piece.write(folder, options, made)?))
+}
+
+/// A point of a sweep that cannot be made is an error of the whole.
+type Made = Result<piece::Material, SweepError>;

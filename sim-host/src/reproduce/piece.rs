@@ -1,0 +1,210 @@
+//! A piece of the reproduction: made at once, written at once, kept for the next run.
+
+use super::claims::Judgement;
+use super::{Made, Options, Quality, errata, figures, sweeps};
+use crate::chaos::sweep::Watch;
+use crate::report::chart::Chart;
+use crate::report::file;
+use anyhow::Context;
+use serde::{Deserialize, Serialize};
+use shared_model::Scenario;
+use std::fs;
+use std::path::Path;
+
+/// A piece that is to be made.
+pub struct Piece {
+    /// Name for files.
+    pub name: String,
+    /// Name for people.
+    pub title: String,
+    /// What it is made of.
+    pub scenario: Named,
+    /// Makes it.
+    pub make: fn(&Named, Quality, Watch) -> Made,
+}
+
+/// A preset or vehicle with its name.
+#[derive(Debug, Clone)]
+pub struct Named {
+    /// Its name.
+    pub name: String,
+    /// Its parameters.
+    pub scenario: Scenario<f64>,
+}
+
+/// A table as CSV: a header row of names with units, and rows of numbers.
+#[derive(Debug, Clone, Default)]
+pub struct Table {
+    /// Names with units.
+    pub header: Vec<String>,
+    /// Rows.
+    pub rows: Vec<Vec<String>>,
+}
+
+/// A figure with its data.
+#[derive(Debug, Clone)]
+pub struct Drawing {
+    /// Name for files, for instance `figure-07`.
+    pub name: String,
+    /// What is to be seen.
+    pub caption: String,
+    /// The figure.
+    pub chart: Chart,
+    /// Its data.
+    pub table: Table,
+}
+
+/// What a piece is, before it is written.
+#[derive(Debug, Default)]
+pub struct Material {
+    /// Figures.
+    pub drawings: Vec<Drawing>,
+    /// Claims judged by it.
+    pub judgements: Vec<Judgement>,
+    /// Findings in words: a heading and a sentence each.
+    pub findings: Vec<(String, String)>,
+}
+
+/// A piece as it is kept.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Product {
+    /// What it was made from: another one makes it anew.
+    fingerprint: String,
+    /// Title.
+    pub title: String,
+    /// Figures: name and caption.
+    pub figures: Vec<(String, String)>,
+    /// Claims judged by it.
+    pub judgements: Vec<Judgement>,
+    /// Findings.
+    pub findings: Vec<(String, String)>,
+}
+
+/// All pieces in the order of the page.
+pub fn all(options: &Options) -> Vec<Piece> {
+    let mut pieces = Vec::new();
+    for (name, scenario) in &options.scenarios {
+        let named = Named {
+            name: name.clone(),
+            scenario: *scenario,
+        };
+        let mut piece = |part: &str, title: &str, make| {
+            pieces.push(Piece {
+                name: format!("{part}-{name}"),
+                title: format!("{title} ({name})"),
+                scenario: named.clone(),
+                make,
+            });
+        };
+        piece(
+            "speed",
+            "Figures 6 and 7: sweep over the speed",
+            sweeps::speed,
+        );
+        piece(
+            "square",
+            "Figure 8: sweep over the square dither's amplitude",
+            sweeps::square,
+        );
+        piece(
+            "sine",
+            "Figure 13: sweep over the sine dither's amplitude",
+            sweeps::sine,
+        );
+        piece(
+            "suppression",
+            "Figures 12 and 17: chaos suppressed",
+            figures::suppression,
+        );
+        piece(
+            "averaging",
+            "Averaging against the true signal",
+            figures::averaging,
+        );
+        piece("errata", "What the print gets wrong", errata::errata);
+    }
+    pieces
+}
+
+impl Piece {
+    /// The piece as an earlier run left it, if it was made of the same.
+    pub fn kept(&self, folder: &Path, options: &Options) -> Option<Product> {
+        let text = fs::read_to_string(self.record(folder)).ok()?;
+        let product: Product = serde_json::from_str(&text).ok()?;
+        let same = product.fingerprint == self.fingerprint(options);
+        let there = |(name, _): &(String, String)| {
+            folder.join(format!("figures/{name}.svg")).exists()
+                && folder.join(format!("figures/{name}.csv")).exists()
+        };
+        (same && product.figures.iter().all(there)).then_some(product)
+    }
+
+    /// Writes the piece, its record last.
+    pub fn write(
+        &self,
+        folder: &Path,
+        options: &Options,
+        material: Material,
+    ) -> anyhow::Result<Product> {
+        let figures = folder.join("figures");
+        fs::create_dir_all(&figures)
+            .with_context(|| format!("cannot make {}", figures.display()))?;
+        for drawing in &material.drawings {
+            let at = |ending| figures.join(format!("{}.{ending}", drawing.name));
+            file::replace(&at("svg"), &drawing.chart.svg()?)?;
+            file::replace(&at("csv"), &drawing.table.csv()?)?;
+        }
+        let product = Product {
+            fingerprint: self.fingerprint(options),
+            title: self.title.clone(),
+            figures: material
+                .drawings
+                .into_iter()
+                .map(|drawing| (drawing.name, drawing.caption))
+                .collect(),
+            judgements: material.judgements,
+            findings: material.findings,
+        };
+        let record = serde_json::to_string_pretty(&product)? + "\n";
+        file::replace(&self.record(folder), &record)?;
+        Ok(product)
+    }
+
+    fn record(&self, folder: &Path) -> std::path::PathBuf {
+        folder.join(format!("figures/{}.json", self.name))
+    }
+
+    /// What the piece is made from.
+    fn fingerprint(&self, options: &Options) -> String {
+        let parameters = crate::config::to_toml(&self.scenario.scenario);
+        format!(
+            "{} {:?}\n{parameters}",
+            env!("CARGO_PKG_VERSION"),
+            options.quality
+        )
+    }
+}
+
+impl Table {
+    /// A table with the given header.
+    pub fn new(header: &[&str]) -> Self {
+        Self {
+            header: header.iter().map(|&name| name.into()).collect(),
+            rows: Vec::new(),
+        }
+    }
+
+    /// Adds a row of numbers.
+    pub fn push(&mut self, row: &[f64]) {
+        self.rows.push(row.iter().map(f64::to_string).collect());
+    }
+
+    fn csv(&self) -> anyhow::Result<String> {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.header)?;
+        for row in &self.rows {
+            writer.write_record(row)?;
+        }
+        Ok(String::from_utf8(writer.into_inner()?)?)
+    }
+}

@@ -1,0 +1,251 @@
+//! Sweeps over the speed and over the dither's amplitude: the diagrams of Figures 6, 7, 8 and 13, and the claims on them.
+
+use super::piece::{Drawing, Material, Named, Table};
+use super::{Made, Quality, claims};
+use crate::chaos::regions::{Regions, regions};
+use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch};
+use crate::paper::REGION_EDGES_RPM;
+use crate::report::chart::{AxisSpec, Chart, Look, Panel, Region, Series};
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+
+/// Speed at which the paper dithers, rpm.
+const DITHERED_RPM: f64 = 1750.0;
+
+/// Transient of paper's start, and time observed, s.
+fn timing(quality: Quality) -> Result<Timing, SweepError> {
+    match quality {
+        Quality::Quick => Timing::new(60.0, 160.0),
+        Quality::Full => Timing::new(200.0, 500.0),
+    }
+}
+
+/// Figures 6 and 7.
+pub fn speed(named: &Named, quality: Quality, watch: Watch) -> Made {
+    let (step, width) = match quality {
+        Quality::Quick => (10.0, 4.0),
+        Quality::Full => (2.0, 0.5),
+    };
+    let values = Values::new("wheel speed", 1500.0, 2000.0, step)?;
+    let sweep = sweep(
+        &named.scenario,
+        Parameter::Speed,
+        &values,
+        width,
+        quality,
+        watch,
+    )?;
+    let (from, to) = (1500.0, 2000.0);
+    let [a, b, c] = REGION_EDGES_RPM;
+    let edges = [("I", from, a), ("II", a, b), ("III", b, c), ("IV", c, to)];
+    let shaded: Vec<Region> = edges
+        .iter()
+        .map(|&(label, from, to)| Region {
+            from,
+            to,
+            label: label.into(),
+        })
+        .collect();
+    let name = &named.name;
+    let exponent = Drawing {
+        name: format!("figure-06-{name}"),
+        caption: format!(
+            "Figure 6 ({name}): largest Lyapunov exponent over the wheel speed, with three standard errors or what the run \
+             can resolve; the paper's regions I to IV shaded."
+        ),
+        chart: exponent_chart(&sweep, &shaded),
+        table: exponent_table(&sweep),
+    };
+    let orbit = Drawing {
+        name: format!("figure-07-{name}"),
+        caption: format!(
+            "Figure 7 ({name}): local maxima of the yaw rate over the wheel speed; the paper's regions I to IV shaded."
+        ),
+        chart: orbit_chart(
+            "Figure 7: orbit diagram over the wheel speed",
+            &sweep,
+            Parameter::Speed,
+            shaded,
+        ),
+        table: orbit_table(&sweep, "wheel_speed_rpm"),
+    };
+    Ok(Material {
+        drawings: vec![exponent, orbit],
+        judgements: claims::of_speeds(name, &sweep),
+        findings: vec![("Regions found".into(), stretches(&sweep, "rpm", 1))],
+    })
+}
+
+/// Figure 8.
+pub fn square(named: &Named, quality: Quality, watch: Watch) -> Made {
+    let (sweep, drawing) = amplitude(named, quality, watch, Waveform::Square, 0.14, "08")?;
+    Ok(Material {
+        drawings: vec![drawing],
+        judgements: claims::of_square_amplitudes(&named.name, &sweep),
+        findings: vec![("Kinds of motion found".into(), stretches(&sweep, "V", 4))],
+    })
+}
+
+/// Figure 13.
+pub fn sine(named: &Named, quality: Quality, watch: Watch) -> Made {
+    let (sweep, drawing) = amplitude(named, quality, watch, Waveform::Sine, 1.4, "13")?;
+    Ok(Material {
+        drawings: vec![drawing],
+        judgements: claims::of_sine_amplitudes(&named.name, &sweep),
+        findings: vec![("Kinds of motion found".into(), stretches(&sweep, "V", 4))],
+    })
+}
+
+fn amplitude(
+    named: &Named,
+    quality: Quality,
+    watch: Watch,
+    waveform: Waveform,
+    greatest_v: f64,
+    number: &str,
+) -> Result<(Regions, Drawing), SweepError> {
+    let mut scenario = named.scenario;
+    scenario.run.wheel_speed_rpm = DITHERED_RPM;
+    scenario.dither.waveform = waveform;
+    let (points, width) = match quality {
+        Quality::Quick => (28.0, greatest_v / 100.0),
+        Quality::Full => (140.0, 0.5e-3),
+    };
+    let values = Values::new("dither amplitude", 0.0, greatest_v, greatest_v / points)?;
+    let sweep = sweep(
+        &scenario,
+        Parameter::Amplitude,
+        &values,
+        width,
+        quality,
+        watch,
+    )?;
+    let word = match waveform {
+        Waveform::Square => "square",
+        _ => "sine",
+    };
+    let name = &named.name;
+    let drawing = Drawing {
+        name: format!("figure-{number}-{name}"),
+        caption: format!(
+            "Figure {} ({name}): local maxima of the yaw rate at {DITHERED_RPM} rpm over the {word} dither's amplitude.",
+            number.trim_start_matches('0')
+        ),
+        chart: orbit_chart(
+            &format!(
+                "Figure {}: orbit diagram over the {word} dither's amplitude",
+                number.trim_start_matches('0')
+            ),
+            &sweep,
+            Parameter::Amplitude,
+            Vec::new(),
+        ),
+        table: orbit_table(&sweep, "dither_amplitude_v"),
+    };
+    Ok((sweep, drawing))
+}
+
+fn sweep(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    values: &Values,
+    width: f64,
+    quality: Quality,
+    watch: Watch,
+) -> Result<Regions, SweepError> {
+    regions(scenario, parameter, values, width, timing(quality)?, watch)
+}
+
+fn exponent_chart(sweep: &Regions, shaded: &[Region]) -> Chart {
+    let with = |value: fn(f64, f64) -> f64| {
+        let point = |sample: &crate::chaos::regions::Sample| {
+            let attractor = &sample.attractor;
+            let exponent = attractor.exponent_per_s?;
+            Some((
+                sample.value,
+                value(exponent, attractor.exponent_threshold_per_s?),
+            ))
+        };
+        sweep.samples.iter().filter_map(point).collect::<Vec<_>>()
+    };
+    let series = |label: &str, line, points| Series {
+        label: label.into(),
+        points,
+        look: Look::Line(line),
+    };
+    Chart {
+        heading: "Figure 6: largest Lyapunov exponent over the wheel speed".into(),
+        panels: vec![Panel {
+            x: AxisSpec::linear("wheel speed (rpm)"),
+            y: AxisSpec::linear("exponent (1/s)"),
+            series: vec![
+                series("exponent", 0, with(|exponent, _| exponent)),
+                series("what counts as positive", 1, with(|_, threshold| threshold)),
+            ],
+            regions: shaded.to_vec(),
+            levels: vec![0.0],
+            ..Panel::default()
+        }],
+    }
+}
+
+fn exponent_table(sweep: &Regions) -> Table {
+    let mut table = Table::new(&["wheel_speed_rpm", "exponent_per_s", "threshold_per_s"]);
+    for sample in &sweep.samples {
+        let attractor = &sample.attractor;
+        if let (Some(exponent), Some(threshold)) =
+            (attractor.exponent_per_s, attractor.exponent_threshold_per_s)
+        {
+            table.push(&[sample.value, exponent, threshold]);
+        }
+    }
+    table
+}
+
+fn orbit_chart(
+    heading: &str,
+    sweep: &Regions,
+    parameter: Parameter,
+    regions: Vec<Region>,
+) -> Chart {
+    let maxima = |sample: &crate::chaos::regions::Sample| {
+        let value = sample.value;
+        let heights = sample.attractor.maxima_rad_per_s.clone();
+        heights.into_iter().map(move |height| (value, height))
+    };
+    Chart {
+        heading: heading.into(),
+        panels: vec![Panel {
+            x: AxisSpec::linear(parameter.name()),
+            y: AxisSpec::linear("yaw rate's maxima (rad/s)"),
+            series: vec![Series {
+                label: String::new(),
+                points: sweep.samples.iter().flat_map(maxima).collect(),
+                look: Look::Dots,
+            }],
+            regions,
+            ..Panel::default()
+        }],
+    }
+}
+
+fn orbit_table(sweep: &Regions, parameter: &str) -> Table {
+    let mut table = Table::new(&[parameter, "yaw_rate_maximum_rad_per_s"]);
+    for sample in &sweep.samples {
+        for &height in &sample.attractor.maxima_rad_per_s {
+            table.push(&[sample.value, height]);
+        }
+    }
+    table
+}
+
+/// The regions in words; runs of short windows in chaos are one entry.
+fn stretches(sweep: &Regions, unit: &str, decimals: usize) -> String {
+    let words = sweep.regions.iter().map(|region| {
+        format!(
+            "{} from {:.decimals$} to {:.decimals$} {unit}",
+            region.kind, region.from, region.to
+        )
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
