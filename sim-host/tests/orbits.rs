@@ -155,10 +155,16 @@ fn continuation_upwards_and_downwards_agree_on_a_period() {
             assert_eq!(fixed.value, other[k].value);
             let extent = |p| {
                 let bound = |pick: fn(f64, f64) -> f64| heights(p).iter().copied().reduce(pick);
-                (bound(f64::min).expect("some"), bound(f64::max).expect("some"))
+                (
+                    bound(f64::min).expect("some"),
+                    bound(f64::max).expect("some"),
+                )
             };
             let (a, b) = (extent(fixed), extent(&other[k]));
-            assert!((a.0 - b.0).abs() < 1e-3 && (a.1 - b.1).abs() < 1e-3, "{a:?} {b:?}");
+            assert!(
+                (a.0 - b.0).abs() < 1e-3 && (a.1 - b.1).abs() < 1e-3,
+                "{a:?} {b:?}"
+            );
         }
     }
 }

@@ -40,7 +40,8 @@ pub fn of_speeds(preset: &str, sweep: &Regions) -> Vec<Judgement> {
         ("C4", third, ends.1, Kind::Chaos),
     ];
     let judge = |(claim, from, to, kind): (&str, f64, f64, Kind)| {
-        let share = share(sweep, from, to, |k| k == kind);
+        let wanted = |k: Kind| k == kind || (kind == Kind::Chaos && k.is_chaotic());
+        let share = share(sweep, from, to, wanted);
         let edges: Vec<_> = [from, to]
             .into_iter()
             .filter(|edge| REGION_EDGES_RPM.contains(edge))
@@ -80,14 +81,14 @@ pub fn of_speeds(preset: &str, sweep: &Regions) -> Vec<Judgement> {
 pub fn of_square_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
     let start = kind_at(sweep, 0.0);
     let end = kind_at(sweep, 0.14);
-    let chaotic_at_first = start == Some(Kind::Chaos);
+    let chaotic_at_first = start.is_some_and(Kind::is_chaotic);
     let tamed = end.is_some_and(|kind| matches!(kind, Kind::Periodic(_) | Kind::Equilibrium));
     let periodic = matches!(end, Some(Kind::Periodic(_)));
     let last_chaos = sweep
         .edges
         .iter()
         .rev()
-        .find(|edge| edge.below == Kind::Chaos);
+        .find(|edge| edge.below.is_chaotic() && !edge.above.is_chaotic());
     let at = kind_at(sweep, 0.1);
     vec![
         Judgement {
@@ -135,7 +136,7 @@ pub fn of_sine_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
         .map(|edge| format!("{:.4} V", edge.middle()))
         .collect();
     let (before, after) = (kind_at(sweep, 0.0), kind_at(sweep, 1.0));
-    let chaos = before == Some(Kind::Chaos);
+    let chaos = before.is_some_and(Kind::is_chaotic);
     let periodic = matches!(after, Some(Kind::Periodic(_)));
     vec![
         Judgement {
@@ -220,7 +221,8 @@ fn composition(sweep: &Regions, from: f64, to: f64) -> String {
     words.collect::<Vec<_>>().join(", ")
 }
 
-/// Middle and half width of the edge between chaos and anything else that is nearest to `claimed`.
+/// Middle and half width of the edge between chaos in one band and anything else that is nearest to `claimed`. Chaos in three
+/// narrow bands looks much like period-3 in a diagram, so the paper's edges are where the bands have merged.
 fn nearest_edge_of_chaos(sweep: &Regions, claimed: f64) -> Option<(f64, f64)> {
     let of_chaos = sweep
         .edges
@@ -249,7 +251,7 @@ fn exponents(sweep: &Regions, from: f64, to: f64, kind: Kind) -> String {
     let inside = sweep
         .samples
         .iter()
-        .filter(|s| s.value >= from && s.value <= to && s.attractor.kind == Kind::Chaos);
+        .filter(|s| s.value >= from && s.value <= to && s.attractor.kind.is_chaotic());
     let rates = inside.filter_map(|sample| sample.attractor.exponent_per_s);
     let (low, high) = rates.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), rate| {
         (low.min(rate), high.max(rate))
