@@ -4,6 +4,7 @@ mod averaging;
 mod config;
 mod convergence;
 mod decode;
+mod lyapunov;
 mod output;
 mod qemu;
 mod reproduce;
@@ -41,6 +42,7 @@ enum Command {
     Verify(verify::Arguments),
     Simulate(simulate::Arguments),
     Reproduce(reproduce::Arguments),
+    Lyapunov(lyapunov::Arguments),
     Averaging(averaging::Arguments),
     Convergence(convergence::Arguments),
     Config(config::Arguments),
@@ -74,6 +76,7 @@ pub fn main() -> ExitCode {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Reproduce(arguments) => reproduce::run(&arguments),
+        Command::Lyapunov(arguments) => lyapunov::run(&arguments),
         Command::Averaging(arguments) => averaging::run(&arguments),
         Command::Convergence(arguments) => convergence::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
