@@ -7,6 +7,7 @@
 //! | exponents by tangent dynamics, the largest one or all | [`lyapunov`] |
 //! | the largest exponent by two neighbouring motions | [`twin`] |
 //! | the largest exponent by synchronisation, the paper's method | [`synchronisation`] |
+//! | what does each of these say of a vehicle's motion? | [`method`] |
 //! | which period has a motion? | [`period`], [`extrema`] |
 //! | what does a motion end on? | [`attractor`], [`basin`] |
 //! | what becomes of it along a parameter? | [`orbit`], [`regions`], [`sweep`] |
@@ -18,6 +19,7 @@ pub mod equilibria;
 pub mod extrema;
 pub mod flow;
 pub mod lyapunov;
+pub mod method;
 pub mod orbit;
 pub mod period;
 pub mod polynomial;

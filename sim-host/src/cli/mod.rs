@@ -7,6 +7,7 @@ mod convergence;
 mod decode;
 mod equilibria;
 mod orbit;
+mod lyapunov;
 mod output;
 mod qemu;
 mod regions;
@@ -46,6 +47,7 @@ enum Command {
     Verify(verify::Arguments),
     Simulate(simulate::Arguments),
     Reproduce(reproduce::Arguments),
+    Lyapunov(lyapunov::Arguments),
     Averaging(averaging::Arguments),
     Convergence(convergence::Arguments),
     Orbit(orbit::Arguments),
@@ -83,6 +85,7 @@ pub fn main() -> ExitCode {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Reproduce(arguments) => reproduce::run(&arguments),
+        Command::Lyapunov(arguments) => lyapunov::run(&arguments),
         Command::Averaging(arguments) => averaging::run(&arguments),
         Command::Convergence(arguments) => convergence::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
