@@ -4,6 +4,9 @@
 //! |---|---|
 //! | how does a scenario move? | [`simulate`] |
 //! | how is a motion stepped in a sweep? | [`motion`] |
+//! | what are the state's components called? | [`component`] |
+//! | what do tyres and dither look like as curves? | [`characteristics`] |
+//! | what of the dither can an actuator produce? | [`realisability`] |
 //! | is a motion chaotic, or which period has it? | [`chaos`] |
 //! | how is the firmware run? | [`pil`] |
 //! | do firmware and host agree? | [`equivalence`] |
@@ -12,11 +15,14 @@
 //! | how are results shown? | [`report`], [`verdict`] |
 
 pub mod chaos;
+pub mod characteristics;
+pub mod component;
 pub mod config;
 pub mod engine;
 pub mod equivalence;
 pub mod motion;
 pub mod pil;
+pub mod realisability;
 pub mod report;
 pub mod simulate;
 pub mod trace;

@@ -6,6 +6,11 @@ use shared_model::vehicle::State;
 /// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
 const BOUND: f64 = 1e3;
 
+/// Whether a state is within the bounds of a vehicle's motion.
+pub(crate) fn is_bounded(state: &State<f64>) -> bool {
+    state.x.iter().all(|value| value.abs() < BOUND)
+}
+
 /// A motion sampled at every model step.
 #[derive(Debug, Clone)]
 pub struct Trace {
@@ -63,8 +68,7 @@ impl Trace {
 
     /// Time at which the motion leaves all physical bounds, if it does, s.
     pub fn diverges_at_s(&self) -> Option<f64> {
-        let bounded = |state: &State<f64>| state.x.iter().all(|value| value.abs() < BOUND);
-        let first = self.states.iter().position(|state| !bounded(state))?;
+        let first = self.states.iter().position(|state| !is_bounded(state))?;
         Some(self.time_s(first))
     }
 

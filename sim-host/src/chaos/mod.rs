@@ -1,4 +1,6 @@
-//! Measures of chaos: the largest Lyapunov exponent and the period.
+//! Measures of chaos: the largest Lyapunov exponent, the period, the Poincaré section and the power spectrum.
 
 pub mod lyapunov;
 pub mod period;
+pub mod poincare;
+pub mod power_spectrum;
