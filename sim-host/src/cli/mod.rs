@@ -2,9 +2,16 @@
 
 mod config;
 mod decode;
+mod nonlinearity;
 mod output;
+mod phase;
+mod poincare;
 mod qemu;
+mod realisability;
+mod settled;
 mod simulate;
+mod spectrum;
+mod tires;
 mod verify;
 
 use clap::{Args, Parser, Subcommand};
@@ -37,6 +44,12 @@ struct Cli {
 enum Command {
     Verify(verify::Arguments),
     Simulate(simulate::Arguments),
+    Phase(phase::Arguments),
+    Poincare(poincare::Arguments),
+    Spectrum(spectrum::Arguments),
+    Tires(tires::Arguments),
+    Nonlinearity(nonlinearity::Arguments),
+    Realisability(realisability::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
     Qemu(qemu::Arguments),
@@ -67,6 +80,12 @@ pub fn main() -> ExitCode {
     let done = match command {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Phase(arguments) => phase::run(&arguments),
+        Command::Poincare(arguments) => poincare::run(&arguments),
+        Command::Spectrum(arguments) => spectrum::run(&arguments),
+        Command::Tires(arguments) => tires::run(&arguments),
+        Command::Nonlinearity(arguments) => nonlinearity::run(&arguments),
+        Command::Realisability(arguments) => realisability::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),
