@@ -7,10 +7,12 @@ use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::dither::{Application, Injection, Waveform};
 use shared_model::friction::{FrictionLaw, Sign};
-use shared_model::tire::{HIGH_FRICTION_ROAD, LOW_FRICTION_ROAD, Road, Tire, TireModel};
+use shared_model::tire::{
+    HIGH_FRICTION_ROAD, LOW_FRICTION_ROAD, MagicFormula, Road, Tire, TireModel,
+};
 
-/// Steps from one end of a curve to the other.
-const STEPS: i32 = 400;
+/// Steps from one end of a curve to the other: the sign's jumps look vertical.
+const STEPS: i32 = 1200;
 
 /// Arguments from `-greatest` to `greatest` in equal steps.
 fn arguments(greatest: f64) -> impl Iterator<Item = f64> {
@@ -78,36 +80,52 @@ pub fn tires(scenario: &Scenario<f64>, greatest_slip_rad: f64) -> Vec<TireRow> {
     rows
 }
 
-/// The figure of [`tires`]: a panel for each road, its axis a little beyond the greatest force of the Magic Formula.
+/// The figure of [`tires`]: a panel for each road, its axis a little beyond the greatest force of the Magic Formula and
+/// the cubic tyre's local maximum.
 pub fn tires_chart(scenario: &Scenario<f64>, rows: &[TireRow]) -> Chart {
     let greatest_slip = rows.last().map_or(1.0, |row| row.slip_angle_rad);
-    let panels = roads(scenario).into_iter().map(|(road, name, _)| {
-        let of = |axle: &'static str| {
-            rows.iter()
-                .filter(move |row| row.road == road && row.axle == axle)
-        };
-        let magic = |axle| of(axle).map(|row| (row.slip_angle_rad, row.magic_formula_n));
-        let cubic = |axle| of(axle).map(|row| (row.slip_angle_rad, row.cubic_n));
-        let peak = magic("front")
-            .chain(magic("rear"))
-            .fold(0.0, |peak: f64, (_, force)| peak.max(force.abs()));
-        Panel {
-            caption: name.into(),
-            x: AxisSpec::linear("slip angle \u{3b1} (rad)").from_to(-greatest_slip, greatest_slip),
-            y: AxisSpec::linear("force F (N)").from_to(-1.25 * peak, 1.25 * peak),
-            series: vec![
-                line("front, Magic Formula", 0, magic("front")),
-                line("front, cubic", 2, cubic("front")),
-                line("rear, Magic Formula", 4, magic("rear")),
-                line("rear, cubic", 1, cubic("rear")),
-            ],
-            levels: vec![0.0],
-            ..Panel::default()
-        }
-    });
+    let panels = roads(scenario)
+        .into_iter()
+        .map(|(road, name, (front, rear))| {
+            let of = |axle: &'static str| {
+                rows.iter()
+                    .filter(move |row| row.road == road && row.axle == axle)
+            };
+            let magic = |axle| of(axle).map(|row| (row.slip_angle_rad, row.magic_formula_n));
+            let cubic = |axle| of(axle).map(|row| (row.slip_angle_rad, row.cubic_n));
+            let peak = [front, rear]
+                .iter()
+                .map(|tire| tire.peak_n.abs().max(cubic_peak_n(tire, greatest_slip)))
+                .fold(0.0, f64::max);
+            Panel {
+                caption: name.into(),
+                x: AxisSpec::linear("slip angle \u{3b1} (rad)")
+                    .from_to(-greatest_slip, greatest_slip),
+                y: AxisSpec::linear("force F (N)").from_to(-1.15 * peak, 1.15 * peak),
+                series: vec![
+                    line("front, Magic Formula", 0, magic("front")),
+                    line("front, cubic", 2, cubic("front")),
+                    line("rear, Magic Formula", 4, magic("rear")),
+                    line("rear, cubic", 1, cubic("rear")),
+                ],
+                levels: vec![0.0],
+                ..Panel::default()
+            }
+        });
     Chart {
         heading: "Cornering force against slip angle".into(),
         panels: panels.collect(),
+    }
+}
+
+/// The cubic tyre's local maximum 2 k1/3 sqrt(k1/(3 k2)) if it has one up to the slip angle, N; else 0.
+fn cubic_peak_n(tire: &MagicFormula<f64>, greatest_slip_rad: f64) -> f64 {
+    let cubic = tire.cubic();
+    let slip_rad = (cubic.linear_n_per_rad / (3.0 * cubic.cubic_n_per_rad3)).sqrt();
+    if slip_rad <= greatest_slip_rad {
+        cubic.force(slip_rad).abs()
+    } else {
+        0.0
     }
 }
 

@@ -16,8 +16,8 @@ pub struct Component {
     pub letter: &'static str,
     /// Name with unit, for columns.
     pub column: &'static str,
-    /// Name with letter and unit, for axes.
-    pub label: &'static str,
+    /// Name and symbol, for headings.
+    pub title: &'static str,
     /// Unit.
     pub unit: &'static str,
 }
@@ -30,7 +30,7 @@ impl Component {
             name: "sideslip",
             letter: "beta",
             column: "sideslip_rad",
-            label: "sideslip angle \u{3b2} (rad)",
+            title: "sideslip angle \u{3b2}",
             unit: "rad",
         },
         Self {
@@ -38,7 +38,7 @@ impl Component {
             name: "yaw_rate",
             letter: "gamma",
             column: "yaw_rate_rad_per_s",
-            label: "yaw rate \u{3b3} (rad/s)",
+            title: "yaw rate \u{3b3}",
             unit: "rad/s",
         },
         Self {
@@ -46,7 +46,7 @@ impl Component {
             name: "steering_angle",
             letter: "delta_f",
             column: "steering_angle_rad",
-            label: "steering angle \u{3b4}f (rad)",
+            title: "steering angle \u{3b4}f",
             unit: "rad",
         },
         Self {
@@ -54,10 +54,22 @@ impl Component {
             name: "steering_rate",
             letter: "delta_f_dot",
             column: "steering_rate_rad_per_s",
-            label: "steering rate d\u{3b4}f/dt (rad/s)",
+            title: "steering rate d\u{3b4}f/dt",
             unit: "rad/s",
         },
     ];
+}
+
+impl Component {
+    /// Name, symbol and unit, for axes.
+    ///
+    /// ```
+    /// let component: sim_host::component::Component = "gamma".parse().unwrap();
+    /// assert_eq!(component.label(), "yaw rate \u{3b3} (rad/s)");
+    /// ```
+    pub fn label(&self) -> String {
+        format!("{} ({})", self.title, self.unit)
+    }
 }
 
 impl fmt::Display for Component {

@@ -39,6 +39,7 @@ pub struct Section {
     pub direction: Direction,
 }
 
+/// The section in words; a precision is that of its value.
 impl fmt::Display for Section {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let direction = match self.direction {
@@ -46,8 +47,12 @@ impl fmt::Display for Section {
             Direction::Falling => "falling",
             Direction::Both => "either way",
         };
+        let value = match f.precision() {
+            Some(decimals) => format!("{:.decimals$}", self.value),
+            None => self.value.to_string(),
+        };
         let unit = self.component.unit;
-        write!(f, "{} = {} {unit}, {direction}", self.component, self.value)
+        write!(f, "{} = {value} {unit}, {direction}", self.component)
     }
 }
 
@@ -111,12 +116,54 @@ pub fn crossings(
     section: &Section,
 ) -> Result<Vec<Crossing>, SectionError> {
     let model = Model::new(scenario);
+    let index = section.component.index;
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut crossings = Vec::new();
+    for_each_step(scenario, transient_s, |time_s, step| {
+        crossings.extend(step.crossing(&model, section).map(|crossing| Crossing {
+            time_s: time_s + crossing.time_s,
+            ..crossing
+        }));
+        (low, high) = (low.min(step.end.x[index]), high.max(step.end.x[index]));
+    })?;
+    if crossings.is_empty() {
+        return Err(SectionError::NeverCrossed {
+            section: *section,
+            duration_s: scenario.run.duration_s,
+            low,
+            high,
+        });
+    }
+    Ok(crossings)
+}
+
+/// Least and greatest value of a component in the same motion as that of [`crossings`].
+///
+/// # Errors
+/// If the scenario is not valid, or the motion diverges.
+pub fn range(
+    scenario: &Scenario<f64>,
+    transient_s: f64,
+    component: Component,
+) -> Result<(f64, f64), SectionError> {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for_each_step(scenario, transient_s, |_, step| {
+        let value = step.end.x[component.index];
+        (low, high) = (low.min(value), high.max(value));
+    })?;
+    Ok((low, high))
+}
+
+/// Hands the steps behind the transient to `visit`, each with the time of its start (s). Nothing is kept, so that a run may be
+/// long.
+fn for_each_step(
+    scenario: &Scenario<f64>,
+    transient_s: f64,
+    mut visit: impl FnMut(f64, &Step),
+) -> Result<(), SectionError> {
     let mut ecu = simulate::settled(scenario, transient_s)?;
     let step_s = scenario.step_s();
-    let index = section.component.index;
     let mut start = *ecu.control.state();
-    let (mut low, mut high) = (start.x[index], start.x[index]);
-    let mut crossings = Vec::new();
     for k in 0..scenario.steps() {
         let dither = loop {
             let sample = ecu.pwm.run();
@@ -135,22 +182,10 @@ pub fn crossings(
             step_s,
             injection: scenario.dither.injection(dither),
         };
-        crossings.extend(step.crossing(&model, section).map(|crossing| Crossing {
-            time_s: time_s + crossing.time_s,
-            ..crossing
-        }));
-        (low, high) = (low.min(end.x[index]), high.max(end.x[index]));
+        visit(time_s, &step);
         start = end;
     }
-    if crossings.is_empty() {
-        return Err(SectionError::NeverCrossed {
-            section: *section,
-            duration_s: scenario.run.duration_s,
-            low,
-            high,
-        });
-    }
-    Ok(crossings)
+    Ok(())
 }
 
 /// One step of a motion.
@@ -287,6 +322,17 @@ mod tests {
         for crossing in crossings(&scenario, 1.0, &falling).unwrap() {
             assert!(crossing.x[1].abs() < 1e-12 && !crossing.rising);
         }
+    }
+
+    #[test]
+    fn the_range_holds_all_crossings() {
+        let scenario = smooth(1000.0);
+        let component: Component = "sideslip".parse().unwrap();
+        let (low, high) = range(&scenario, 0.0, component).unwrap();
+        assert!(low < high);
+        let middle = section("sideslip", 0.5 * (low + high), Direction::Both);
+        assert!(!crossings(&scenario, 0.0, &middle).unwrap().is_empty());
+        assert_eq!(format!("{middle:.1}").matches('.').count(), 1);
     }
 
     #[test]

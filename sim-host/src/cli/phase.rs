@@ -86,8 +86,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             look: Look::Line(0),
         };
         let panel = Panel {
-            x: AxisSpec::linear(x.label),
-            y: AxisSpec::linear(y.label),
+            x: AxisSpec::linear(x.label()),
+            y: AxisSpec::linear(y.label()),
             series: vec![series],
             ..Panel::default()
         };

@@ -6,7 +6,7 @@ use super::settled::{SettledRun, title};
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
 use serde::Serialize;
-use sim_host::chaos::poincare::{Crossing, Direction, Section, crossings};
+use sim_host::chaos::poincare::{Crossing, Direction, Section, crossings, range};
 use sim_host::component::Component;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 
@@ -123,8 +123,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let value = match arguments.at {
         Some(value) => value,
         None => {
-            let trace = arguments.run.trace(&scenario)?;
-            let (low, high) = trace.range(component.index, 0);
+            let (low, high) = range(&scenario, arguments.run.transient, component)
+                .context("nothing was written")?;
             ensure!(
                 high - low > 1e-9,
                 "the motion is at rest: {component} ranges from {low} to {high} {}, so no section is crossed; nothing was written",
@@ -162,9 +162,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
                 look: Look::Dots,
             };
             let panel = Panel {
-                caption: format!("{} crossings of {section}", found.len()),
-                x: AxisSpec::linear(x.label),
-                y: AxisSpec::linear(y.label),
+                caption: format!("{} crossings of {section:.4}", found.len()),
+                x: AxisSpec::linear(x.label()),
+                y: AxisSpec::linear(y.label()),
                 series: vec![series],
                 ..Panel::default()
             };

@@ -56,8 +56,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             "{option} {volts}: must be greater than 0 and at most 1000 V"
         );
     }
-    arguments.destinations.check_free()?;
     let amplitudes = Amplitudes::from_volts(&scenario, arguments.square_v, arguments.sine_v);
+    ensure!(
+        amplitudes.square_rad > 0.0 && amplitudes.sine_rad > 0.0,
+        "dither.square_rad_per_volt = {} and dither.sine_rad_per_volt = {}: both must be greater than 0",
+        scenario.dither.square_rad_per_volt,
+        scenario.dither.sine_rad_per_volt
+    );
+    arguments.destinations.check_free()?;
     let rows = responses(&scenario, &amplitudes);
     let results = Results {
         demands: demands(&scenario, &amplitudes),

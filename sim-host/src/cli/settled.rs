@@ -9,6 +9,8 @@ use sim_host::trace::Trace;
 
 /// Least and greatest transient, s.
 const TRANSIENTS_S: std::ops::RangeInclusive<f64> = 0.0..=100_000.0;
+/// Most states that are kept in memory.
+const MOST_STATES: u32 = 20_000_000;
 
 /// A run that settles before it is looked at. The dither, if there is one, is on from the start.
 #[derive(Args)]
@@ -41,6 +43,12 @@ impl SettledRun {
 
     /// The motion of the scenario behind the transient.
     pub fn trace(&self, scenario: &Scenario<f64>) -> anyhow::Result<Trace> {
+        ensure!(
+            scenario.steps() <= MOST_STATES,
+            "--time {}: must be at most {} s, which is {MOST_STATES} steps",
+            scenario.run.duration_s,
+            f64::from(MOST_STATES) * scenario.step_s()
+        );
         let trace = record(&mut settled(scenario, self.transient)?, scenario);
         if let Some(time_s) = trace.diverges_at_s() {
             bail!(

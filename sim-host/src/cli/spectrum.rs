@@ -14,6 +14,8 @@ use std::f64::consts::TAU;
 
 /// Segments of half overlap that a run has by default: the density to a third of itself, in one bin.
 const SEGMENTS: f64 = 8.0;
+/// Intervals of the frequency axis in the figure.
+const INTERVALS: f64 = 700.0;
 
 /// Power spectrum of the settled motion by Welch's method (Hann window, half overlap, one-sided density).
 ///
@@ -180,17 +182,14 @@ fn chart(scenario: &Scenario<f64>, results: &Results) -> Chart {
     let unit = results.component.unit;
     let panel = Panel {
         caption: format!(
-            "{} segments, Hann window, half overlap; bins of {:.3} Hz",
+            "{} segments, Hann window, half overlap; bins of {:.3} Hz, the greatest in each drawn interval",
             results.segments, results.bin_hz
         ),
         x: AxisSpec::logarithmic("frequency (Hz)").from_to(ends.0, ends.1),
         y: AxisSpec::logarithmic(format!("density (({unit})\u{b2}/Hz)")),
         series: vec![Series {
             label: String::new(),
-            points: bins
-                .iter()
-                .map(|bin| (bin.frequency_hz, bin.density_per_hz))
-                .collect(),
+            points: envelope(bins, ends),
             look: Look::Line(0),
         }],
         instants: results.dither.iter().map(instant).collect(),
@@ -199,9 +198,25 @@ fn chart(scenario: &Scenario<f64>, results: &Results) -> Chart {
     Chart {
         heading: format!(
             "Power spectrum of {} \u{2013} {}",
-            results.component.label,
+            results.component.title,
             title(scenario)
         ),
         panels: vec![panel],
     }
+}
+
+/// The bin with the greatest density in each of many intervals of equal length on a logarithmic axis.
+fn envelope(bins: &[Row], (low, high): (f64, f64)) -> Vec<(f64, f64)> {
+    let interval = |row: &Row| {
+        let share = (row.frequency_hz / low).ln() / (high / low).ln();
+        (share * INTERVALS) as i64
+    };
+    bins.chunk_by(|a, b| interval(a) == interval(b))
+        .filter_map(|chunk| {
+            chunk
+                .iter()
+                .max_by(|a, b| a.density_per_hz.total_cmp(&b.density_per_hz))
+        })
+        .map(|row| (row.frequency_hz, row.density_per_hz))
+        .collect()
 }
