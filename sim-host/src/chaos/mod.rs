@@ -11,6 +11,7 @@
 //! | which period has a motion? | [`period`], [`extrema`] |
 //! | what does a motion end on? | [`attractor`], [`basin`] |
 //! | what becomes of it along a parameter? | [`orbit`], [`regions`], [`sweep`] |
+//! | where does it cross a section, and which frequencies are in it? | [`poincare`], [`power_spectrum`] |
 //! | where can it rest, and is that stable? | [`equilibria`], [`polynomial`] |
 
 pub mod attractor;
@@ -22,7 +23,9 @@ pub mod lyapunov;
 pub mod method;
 pub mod orbit;
 pub mod period;
+pub mod poincare;
 pub mod polynomial;
+pub mod power_spectrum;
 pub mod regions;
 pub mod sweep;
 pub mod synchronisation;

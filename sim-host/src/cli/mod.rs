@@ -6,14 +6,21 @@ mod config;
 mod convergence;
 mod decode;
 mod equilibria;
-mod orbit;
 mod lyapunov;
+mod nonlinearity;
+mod orbit;
 mod output;
+mod phase;
+mod poincare;
 mod qemu;
+mod realisability;
 mod regions;
 mod reproduce;
+mod settled;
 mod simulate;
+mod spectrum;
 mod sweep;
+mod tires;
 mod verify;
 
 use clap::{Args, Parser, Subcommand};
@@ -54,6 +61,12 @@ enum Command {
     Regions(regions::Arguments),
     Equilibria(equilibria::Arguments),
     Basin(basin::Arguments),
+    Phase(phase::Arguments),
+    Poincare(poincare::Arguments),
+    Spectrum(spectrum::Arguments),
+    Tires(tires::Arguments),
+    Nonlinearity(nonlinearity::Arguments),
+    Realisability(realisability::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
     Qemu(qemu::Arguments),
@@ -92,6 +105,12 @@ pub fn main() -> ExitCode {
         Command::Regions(arguments) => regions::run(&arguments),
         Command::Equilibria(arguments) => equilibria::run(&arguments),
         Command::Basin(arguments) => basin::run(&arguments),
+        Command::Phase(arguments) => phase::run(&arguments),
+        Command::Poincare(arguments) => poincare::run(&arguments),
+        Command::Spectrum(arguments) => spectrum::run(&arguments),
+        Command::Tires(arguments) => tires::run(&arguments),
+        Command::Nonlinearity(arguments) => nonlinearity::run(&arguments),
+        Command::Realisability(arguments) => realisability::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),
