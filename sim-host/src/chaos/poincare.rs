@@ -80,7 +80,7 @@ pub enum SectionError {
     )]
     NeverCrossed {
         /// The section.
-        section: Section,
+        section: Box<Section>,
         /// Length of the run, s.
         duration_s: f64,
         /// The component's least value.
@@ -128,7 +128,7 @@ pub fn crossings(
     })?;
     if crossings.is_empty() {
         return Err(SectionError::NeverCrossed {
-            section: *section,
+            section: Box::new(*section),
             duration_s: scenario.run.duration_s,
             low,
             high,

@@ -12,7 +12,7 @@ use sim_host::component::Component;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 use std::f64::consts::TAU;
 
-/// Segments of half overlap that a run has by default: the density to a third of itself, in one bin.
+/// Segments of half overlap that a run has by default.
 const SEGMENTS: f64 = 8.0;
 /// Intervals of the frequency axis in the figure.
 const INTERVALS: f64 = 700.0;
@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Component of the state
     #[arg(long, value_name = "COMPONENT", default_value = "yaw_rate")]
     component: Component,
-    /// Length of a segment, s: two lines are told apart from two over it in Hz; without, two ninths of the run
+    /// Length of a segment, s; lines closer than 2/SECONDS Hz merge. Without, two ninths of the run: eight segments
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     segment: Option<f64>,
     #[command(flatten)]
