@@ -35,7 +35,7 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let (stopped, whole) = (folder.path().join("stopped"), folder.path().join("whole"));
 
-    // Stop in the middle of the second piece.
+    // Stop in the middle of the third piece.
     let stop = AtomicBool::new(false);
     let piece = AtomicUsize::new(0);
     let summary = reproduce(&stopped, &options(), &stop, &|progress| match progress {
@@ -50,11 +50,11 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
     assert_eq!(
         summary.judgements.len(),
         4,
-        "the first piece is done, with C1 to C4"
+        "the sweep over the speed is done, with C1 to C4"
     );
     assert!(stopped.join("index.html").exists());
 
-    // Go on, to the end of the third piece: the first one is kept.
+    // Go on, to the end of the fourth piece: the first two are kept.
     let kept = Mutex::new(Vec::new());
     let go_on = |folder: &Path| {
         let stop = AtomicBool::new(false);
@@ -64,13 +64,13 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
             } => {
                 kept.lock().expect("nobody panics with it").push(number);
             }
-            Progress::Begins { number: 4, .. } => stop.store(true, Ordering::Relaxed),
+            Progress::Begins { number: 5, .. } => stop.store(true, Ordering::Relaxed),
             _ => {}
         })
         .expect("it can be made")
     };
     assert_eq!(go_on(&stopped).judgements.len(), 8);
-    assert_eq!(*kept.lock().expect("nobody panics with it"), [1]);
+    assert_eq!(*kept.lock().expect("nobody panics with it"), [1, 2]);
 
     // At once, on one thread.
     let pool = rayon::ThreadPoolBuilder::new()
@@ -96,10 +96,10 @@ fn the_claims_that_hold_are_found_and_a_tame_vehicle_has_none() {
             quality: Quality::Quick,
             scenarios: vec![(name.into(), scenario)],
         };
-        // Claims on amplitudes are in the second and third piece.
+        // Claims on amplitudes are in the third and fourth piece.
         let stop = AtomicBool::new(false);
         let summary = reproduce(&folder.path().join(name), &options, &stop, &|progress| {
-            if let Progress::Begins { number: 4, .. } = progress {
+            if let Progress::Begins { number: 5, .. } = progress {
                 stop.store(true, Ordering::Relaxed);
             }
         })

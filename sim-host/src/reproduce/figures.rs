@@ -53,7 +53,7 @@ pub fn suppression(named: &Named, _quality: Quality, watch: Watch) -> Made {
                 RUN_S - SETTLED_S
             ),
             chart: chart(number, &before, &after, scenario.dither.start_time_s),
-            table: table(&before, &after),
+            csv: table(&before, &after).csv(),
         });
         material.findings.push((
             format!("{word} dither of {amplitude_v} V"),
@@ -203,7 +203,7 @@ pub fn averaging(named: &Named, quality: Quality, watch: Watch) -> Made {
             heading: "The true dither signal against the averaged system".into(),
             panels,
         },
-        table,
+        csv: table.csv(),
     });
     Ok(material)
 }

@@ -1,6 +1,7 @@
 //! The paper reproduced: its figures, its claims, and what it leaves out, as pieces that are made one after the other, kept when
 //! they are done, and not made again.
 
+mod characteristics;
 mod claims;
 mod errata;
 mod figures;

@@ -1,7 +1,7 @@
 //! A piece of the reproduction: made at once, written at once, kept for the next run.
 
 use super::claims::Judgement;
-use super::{Made, Options, Quality, errata, figures, sensitivity, sweeps};
+use super::{Made, Options, Quality, characteristics, errata, figures, sensitivity, sweeps};
 use crate::chaos::sweep::Watch;
 use crate::report::chart::Chart;
 use crate::report::file;
@@ -50,8 +50,8 @@ pub struct Drawing {
     pub caption: String,
     /// The figure.
     pub chart: Chart,
-    /// Its data.
-    pub table: Table,
+    /// Its data, as CSV with a header row of names with units.
+    pub csv: String,
 }
 
 /// What a piece is, before it is written.
@@ -96,6 +96,11 @@ pub fn all(options: &Options) -> Vec<Piece> {
                 make,
             });
         };
+        piece(
+            "characteristics",
+            "Figures 2, 9 to 11 and 14 to 16: tyres and effective nonlinearities; realisability",
+            characteristics::characteristics,
+        );
         piece(
             "speed",
             "Figures 6 and 7: sweep over the speed",
@@ -160,7 +165,7 @@ impl Piece {
         for drawing in &material.drawings {
             let at = |ending| figures.join(format!("{}.{ending}", drawing.name));
             file::replace(&at("svg"), &drawing.chart.svg()?)?;
-            file::replace(&at("csv"), &drawing.table.csv()?)?;
+            file::replace(&at("csv"), &drawing.csv)?;
         }
         let product = Product {
             fingerprint: self.fingerprint(options),
@@ -207,12 +212,28 @@ impl Table {
         self.rows.push(row.iter().map(f64::to_string).collect());
     }
 
-    fn csv(&self) -> anyhow::Result<String> {
+    /// The table as CSV.
+    pub fn csv(&self) -> String {
         let mut writer = csv::Writer::from_writer(Vec::new());
-        writer.write_record(&self.header)?;
-        for row in &self.rows {
-            writer.write_record(row)?;
+        for row in std::iter::once(&self.header).chain(&self.rows) {
+            writer.write_record(row).expect(IN_MEMORY);
         }
-        Ok(String::from_utf8(writer.into_inner()?)?)
+        text(writer)
     }
+}
+
+/// Rows of named fields as CSV.
+pub fn csv_of(rows: impl IntoIterator<Item = impl Serialize>) -> String {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row).expect(IN_MEMORY);
+    }
+    text(writer)
+}
+
+const IN_MEMORY: &str = "plain rows of equal length can be written to memory";
+
+fn text(writer: csv::Writer<Vec<u8>>) -> String {
+    let bytes = writer.into_inner().expect(IN_MEMORY);
+    String::from_utf8(bytes).expect("numbers and names are text")
 }

@@ -61,7 +61,7 @@ pub fn sensitivity(named: &Named, quality: Quality, watch: Watch) -> Made {
                 named.name
             ),
             chart: chart(curves),
-            table,
+            csv: table.csv(),
         }],
         findings,
         ..Material::default()

@@ -54,7 +54,7 @@ pub fn speed(named: &Named, quality: Quality, watch: Watch) -> Made {
              can resolve; the paper's regions I to IV shaded."
         ),
         chart: exponent_chart(&sweep, &shaded),
-        table: exponent_table(&sweep),
+        csv: exponent_table(&sweep).csv(),
     };
     let orbit = Drawing {
         name: format!("figure-07-{name}"),
@@ -67,7 +67,7 @@ pub fn speed(named: &Named, quality: Quality, watch: Watch) -> Made {
             Parameter::Speed,
             shaded,
         ),
-        table: orbit_table(&sweep, "wheel_speed_rpm"),
+        csv: orbit_table(&sweep, "wheel_speed_rpm").csv(),
     };
     Ok(Material {
         drawings: vec![exponent, orbit],
@@ -140,7 +140,7 @@ fn amplitude(
             Parameter::Amplitude,
             Vec::new(),
         ),
-        table: orbit_table(&sweep, "dither_amplitude_v"),
+        csv: orbit_table(&sweep, "dither_amplitude_v").csv(),
     };
     Ok((sweep, drawing))
 }
