@@ -18,7 +18,7 @@ pub fn simulate<T: Real>(scenario: &Scenario<T>) -> Result<Trace, InvalidScenari
 ///
 /// # Errors
 /// If the scenario is not valid.
-pub fn settled<T: Real>(
+pub fn after_transient<T: Real>(
     scenario: &Scenario<T>,
     transient_s: f64,
 ) -> Result<Ecu<T>, InvalidScenario> {

@@ -161,7 +161,7 @@ fn for_each_step(
     transient_s: f64,
     mut visit: impl FnMut(f64, &Step),
 ) -> Result<(), SectionError> {
-    let mut ecu = simulate::settled(scenario, transient_s)?;
+    let mut ecu = simulate::after_transient(scenario, transient_s)?;
     let step_s = scenario.step_s();
     let mut start = *ecu.control.state();
     for k in 0..scenario.steps() {

@@ -4,7 +4,7 @@ use super::RunOptions;
 use anyhow::{bail, ensure};
 use clap::Args;
 use shared_model::Scenario;
-use sim_host::simulate::{record, settled};
+use sim_host::simulate::{after_transient, record};
 use sim_host::trace::Trace;
 
 /// Least and greatest transient, s.
@@ -49,7 +49,7 @@ impl SettledRun {
             scenario.run.duration_s,
             f64::from(MOST_STATES) * scenario.step_s()
         );
-        let trace = record(&mut settled(scenario, self.transient)?, scenario);
+        let trace = record(&mut after_transient(scenario, self.transient)?, scenario);
         if let Some(time_s) = trace.diverges_at_s() {
             bail!(
                 "the motion diverges: beyond all bounds {time_s} s behind the transient of {} s; nothing was written. Set B of \
