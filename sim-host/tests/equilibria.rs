@@ -140,7 +140,13 @@ fn motions_grow_above_the_hopf_speed_and_decay_below() {
         let pair = equilibrium.leading_pair().expect("it oscillates");
         assert_eq!(pair.re > 0.0, grows);
         let (growth, frequency) = oscillation(&scenario, equilibrium);
-        assert!((growth - pair.re).abs() < 1e-4, "{rpm} rpm: {growth} against {pair}");
-        assert!((frequency / pair.im - 1.0).abs() < 1e-4, "{frequency} against {pair}");
+        assert!(
+            (growth - pair.re).abs() < 1e-4,
+            "{rpm} rpm: {growth} against {pair}"
+        );
+        assert!(
+            (frequency / pair.im - 1.0).abs() < 1e-4,
+            "{frequency} against {pair}"
+        );
     }
 }
