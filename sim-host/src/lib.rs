@@ -4,6 +4,9 @@
 //! |---|---|
 //! | how does a scenario move? | [`simulate`] |
 //! | how is a motion stepped in a sweep? | [`motion`] |
+//! | what are the state's components called? | [`component`] |
+//! | what do tyres and dither look like as curves? | [`characteristics`] |
+//! | what of the dither can an actuator produce? | [`realisability`] |
 //! | is a motion chaotic, or which period has it? | [`chaos`] |
 //! | where does averaging the dither start to hold? | [`averaging`] |
 //! | how good is the fixed step? | [`convergence`], [`engine::reference`] |
@@ -15,6 +18,8 @@
 
 pub mod averaging;
 pub mod chaos;
+pub mod characteristics;
+pub mod component;
 pub mod config;
 pub mod convergence;
 pub mod engine;
@@ -22,6 +27,7 @@ pub mod equivalence;
 pub mod motion;
 pub mod paper;
 pub mod pil;
+pub mod realisability;
 pub mod report;
 pub mod reproduce;
 pub mod simulate;

@@ -11,7 +11,29 @@ use shared_model::{InvalidScenario, Real, Scenario};
 /// # Errors
 /// If the scenario is not valid.
 pub fn simulate<T: Real>(scenario: &Scenario<T>) -> Result<Trace, InvalidScenario> {
-    let mut ecu = Ecu::new(scenario)?;
+    Ok(record(&mut Ecu::new(scenario)?, scenario))
+}
+
+/// The program of a scenario whose dither is on from the start, after a transient of `transient_s`.
+///
+/// # Errors
+/// If the scenario is not valid.
+pub fn settled<T: Real>(
+    scenario: &Scenario<T>,
+    transient_s: f64,
+) -> Result<Ecu<T>, InvalidScenario> {
+    let mut scenario = *scenario;
+    scenario.dither.start_time_s = T::zero();
+    let mut ecu = Ecu::new(&scenario)?;
+    let steps = (transient_s * scenario.model_rate_hz().to_f64()).round() as u64;
+    for _ in 0..steps {
+        ecu.step(|_| {});
+    }
+    Ok(ecu)
+}
+
+/// Records the motion of a scenario from the program's present state on, for the scenario's length.
+pub fn record<T: Real>(ecu: &mut Ecu<T>, scenario: &Scenario<T>) -> Trace {
     let steps = scenario.steps() as usize;
     let samples_per_step = scenario.samples_per_step() as usize;
     let initial = ecu.control.state().map(Real::to_f64);
@@ -21,14 +43,14 @@ pub fn simulate<T: Real>(scenario: &Scenario<T>) -> Result<Trace, InvalidScenari
         let state = ecu.step(|duty| duties.push(duty.code()));
         states.push(state.map(Real::to_f64));
     }
-    Ok(Trace {
+    Trace {
         step_s: 1.0 / scenario.model_rate_hz().to_f64(),
         initial,
         states,
         duties,
         samples_per_step,
         pwm_period: ecu.pwm.neutral().period(),
-    })
+    }
 }
 
 /// State after `time_s` of the scenario's motion without dither: a start on the attractor.

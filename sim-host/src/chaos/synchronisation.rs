@@ -17,6 +17,8 @@ use shared_model::vehicle::{STEERING_ANGLE, STEERING_RATE};
 
 /// Starts from which the search is repeated.
 const STARTS: usize = 16;
+/// A finer bisection would only look at rounding, 1/s.
+const LEAST_TOLERANCE_PER_S: f64 = 1e-9;
 /// Distance at which the response begins, and begins anew.
 const DISTANCE: f64 = 1e-8;
 /// It begins anew when it is nearer than this, or further than the other: still where e' = (Df - d) e holds, and well above
@@ -25,7 +27,7 @@ const NEAR: f64 = 1e-11;
 const FAR: f64 = 1e-5;
 
 /// Where the least synchronising coupling is searched for, and how closely.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Search {
     /// Lower end of the interval, 1/s. A negative coupling drives the motions apart and finds negative exponents.
     pub from_per_s: f64,
@@ -33,6 +35,34 @@ pub struct Search {
     pub to_per_s: f64,
     /// Width at which the bisection ends, 1/s.
     pub tolerance_per_s: f64,
+}
+
+/// A search that cannot be made.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "search for a coupling from {} to {} 1/s to a tolerance of {} 1/s: the ends must rise, the tolerance be from {} 1/s to the interval's width",
+    .0.from_per_s, .0.to_per_s, .0.tolerance_per_s, LEAST_TOLERANCE_PER_S
+)]
+pub struct InvalidSearch(Search);
+
+impl Search {
+    /// The search itself, if it can be made.
+    ///
+    /// # Errors
+    /// If the interval is empty, reversed or not finite, or the tolerance is too small or wider than the interval.
+    pub fn validated(self) -> Result<Self, InvalidSearch> {
+        let width = self.to_per_s - self.from_per_s;
+        let possible = width.is_finite()
+            && width > 0.0
+            && (LEAST_TOLERANCE_PER_S..=width).contains(&self.tolerance_per_s);
+        possible.then_some(self).ok_or(InvalidSearch(self))
+    }
+
+    /// Couplings that a bisection judges: both ends, and one for each halving.
+    pub fn couplings_tried(&self) -> u32 {
+        let width = self.to_per_s - self.from_per_s;
+        2 + (width / self.tolerance_per_s).log2().ceil() as u32
+    }
 }
 
 impl Default for Search {

@@ -6,13 +6,21 @@ mod config;
 mod convergence;
 mod decode;
 mod equilibria;
+mod lyapunov;
+mod nonlinearity;
 mod orbit;
 mod output;
+mod phase;
+mod poincare;
 mod qemu;
+mod realisability;
 mod regions;
 mod reproduce;
+mod settled;
 mod simulate;
+mod spectrum;
 mod sweep;
+mod tires;
 mod verify;
 
 use clap::{Args, Parser, Subcommand};
@@ -46,12 +54,19 @@ enum Command {
     Verify(verify::Arguments),
     Simulate(simulate::Arguments),
     Reproduce(reproduce::Arguments),
+    Lyapunov(lyapunov::Arguments),
     Averaging(averaging::Arguments),
     Convergence(convergence::Arguments),
     Orbit(orbit::Arguments),
     Regions(regions::Arguments),
     Equilibria(equilibria::Arguments),
     Basin(basin::Arguments),
+    Phase(phase::Arguments),
+    Poincare(poincare::Arguments),
+    Spectrum(spectrum::Arguments),
+    Tires(tires::Arguments),
+    Nonlinearity(nonlinearity::Arguments),
+    Realisability(realisability::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
     Qemu(qemu::Arguments),
@@ -83,12 +98,19 @@ pub fn main() -> ExitCode {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Reproduce(arguments) => reproduce::run(&arguments),
+        Command::Lyapunov(arguments) => lyapunov::run(&arguments),
         Command::Averaging(arguments) => averaging::run(&arguments),
         Command::Convergence(arguments) => convergence::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Regions(arguments) => regions::run(&arguments),
         Command::Equilibria(arguments) => equilibria::run(&arguments),
         Command::Basin(arguments) => basin::run(&arguments),
+        Command::Phase(arguments) => phase::run(&arguments),
+        Command::Poincare(arguments) => poincare::run(&arguments),
+        Command::Spectrum(arguments) => spectrum::run(&arguments),
+        Command::Tires(arguments) => tires::run(&arguments),
+        Command::Nonlinearity(arguments) => nonlinearity::run(&arguments),
+        Command::Realisability(arguments) => realisability::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),

@@ -104,7 +104,7 @@ pub struct Series {
 pub enum Look {
     /// Joined by the n-th line style. A line so short that it could not be seen is drawn as a large dot.
     Line(usize),
-    /// Small dots. Each such series of a panel has its own colour.
+    /// Small dots, those of the same pixel once. Each such series of a panel has its own colour.
     Dots,
 }
 

@@ -132,7 +132,7 @@ fn table(before: &Trace, after: &Trace) -> Table {
 /// The true signal against the averaged system from 200 to 20,000 rad/s.
 pub fn averaging(named: &Named, quality: Quality, watch: Watch) -> Made {
     let count = match quality {
-        Quality::Quick => 5,
+        Quality::Quick => 3,
         Quality::Full => 17,
     };
     let frequencies: Vec<f64> = (0..count)

@@ -6,6 +6,7 @@ mod errata;
 mod figures;
 mod page;
 mod piece;
+mod sensitivity;
 mod sweeps;
 
 pub use claims::Judgement;

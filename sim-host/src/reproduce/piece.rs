@@ -1,7 +1,7 @@
 //! A piece of the reproduction: made at once, written at once, kept for the next run.
 
 use super::claims::Judgement;
-use super::{Made, Options, Quality, errata, figures, sweeps};
+use super::{Made, Options, Quality, errata, figures, sensitivity, sweeps};
 use crate::chaos::sweep::Watch;
 use crate::report::chart::Chart;
 use crate::report::file;
@@ -83,7 +83,7 @@ pub struct Product {
 /// All pieces in the order of the page.
 pub fn all(options: &Options) -> Vec<Piece> {
     let mut pieces = Vec::new();
-    for (name, scenario) in &options.scenarios {
+    for (k, (name, scenario)) in options.scenarios.iter().enumerate() {
         let named = Named {
             name: name.clone(),
             scenario: *scenario,
@@ -121,6 +121,14 @@ pub fn all(options: &Options) -> Vec<Piece> {
             "Averaging against the true signal",
             figures::averaging,
         );
+        // The readings that are compared include the other preset's.
+        if k == 0 {
+            piece(
+                "sensitivity",
+                "How the edges move",
+                sensitivity::sensitivity,
+            );
+        }
         piece("errata", "What the print gets wrong", errata::errata);
     }
     pieces

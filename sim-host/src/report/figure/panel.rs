@@ -23,6 +23,7 @@ pub const BESIDE: u32 = MARGIN + LEFT;
 /// Room right of a panel's axes.
 pub const RIGHT: u32 = 36;
 const TICK: i32 = 7;
+const FEW_DOTS: usize = 1500;
 
 /// Height of a stack of panels of the given height, only the last of which names its horizontal axis.
 pub fn stack_height(panels: usize, height: u32) -> u32 {
@@ -108,7 +109,7 @@ impl<'a> Panel<'a> {
         )
     }
 
-    /// Small dots, those in the same pixel once.
+    /// Dots, those in the same pixel once: as small as the line is wide, or twice as large where they are few.
     pub fn dots(&self, points: &[Point], line: Line) -> anyhow::Result<()> {
         let area = self.chart.plotting_area();
         let places = points.iter().map(|point| area.map_coordinate(point));
@@ -119,8 +120,13 @@ impl<'a> Panel<'a> {
                 .iter()
                 .flat_map(|&(x, from, to)| [(x - left, from - top), (x - left, to - top)])
                 .collect();
+            let width = if runs.len() < FEW_DOTS {
+                2 * line.width
+            } else {
+                line.width
+            };
             area.strip_coord_spec()
-                .draw(&PathElement::new(ends, line))?;
+                .draw(&PathElement::new(ends, Line { width, ..line }))?;
         }
         Ok(())
     }

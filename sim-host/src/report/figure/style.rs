@@ -229,12 +229,9 @@ fn dotted(svg: &str, line: Line) -> String {
     let mut parts = svg.split(&start);
     let mut out = parts.next().unwrap_or_default().to_owned();
     for part in parts {
-        let (points, rest) = part
-            .split_once("points=\"")
-            .and_then(|(_, rest)| rest.split_once('"'))
-            .unwrap_or(("", part));
-        let width = line.width;
-        let stroke = format!("stroke=\"#{r:02X}{g:02X}{b:02X}\" stroke-width=\"{width}\"");
+        let (width, rest) = part.split_once(" points=\"").unwrap_or((part, ""));
+        let (points, rest) = rest.split_once('"').unwrap_or(("", rest));
+        let stroke = format!("stroke=\"#{r:02X}{g:02X}{b:02X}\"{width}");
         out += &format!("<path fill=\"none\" {stroke} stroke-linecap=\"round\" d=\"");
         let mut points = points.split_ascii_whitespace();
         while let (Some(from), Some(to)) = (points.next(), points.next()) {

@@ -1,0 +1,333 @@
+//! `sim-host lyapunov`: Lyapunov exponents over the wheel speed.
+
+use super::output::Destinations;
+use super::{COULD_NOT_RUN, Done, RunOptions};
+use anyhow::ensure;
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
+use shared_model::Scenario;
+use sim_host::chaos::flow::{Flow, VehicleFlow};
+use sim_host::chaos::method::{Estimate, Method, estimate};
+use sim_host::chaos::sweep::{Parameter, Timing, Values, Watch, scenarios};
+use sim_host::chaos::synchronisation::Search;
+use sim_host::pil::qemu::INTERRUPTED;
+use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use std::time::{Duration, Instant};
+
+/// Lyapunov exponents of the motion, at one speed or over a range of speeds, by three independent methods.
+///
+/// Positive: chaos. The dither, if there is one, is averaged and on from the start. A motion that diverges and a search that finds
+/// nothing are named in the results. Ctrl-C stops behind the points in work and writes what is done.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host lyapunov --rpm 1750 --method all          three methods side by side
+  sim-host lyapunov --rpm 1750 --spectrum            all four exponents
+  sim-host lyapunov --from 1500 --to 1950 --step 5 --out exponents.csv --figure exponents.svg
+  sim-host lyapunov --rpm 1750 --dither square --amplitude-v 0.1
+  sim-host lyapunov --rpm 1600 --method printed-response         equation (20) to the letter")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Lowest wheel speed of a range, rpm
+    #[arg(long, value_name = "RPM", allow_negative_numbers = true, requires_all = ["to", "step"], conflicts_with = "rpm")]
+    from: Option<f64>,
+    /// Highest wheel speed of a range, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        allow_negative_numbers = true,
+        requires = "from"
+    )]
+    to: Option<f64>,
+    /// Step of the range, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        allow_negative_numbers = true,
+        requires = "from"
+    )]
+    step: Option<f64>,
+    /// How the largest exponent is measured
+    #[arg(long, value_enum, default_value = "tangent")]
+    method: Choice,
+    /// All four exponents by tangent dynamics, beside those of --method twin or synchronisation
+    #[arg(long)]
+    spectrum: bool,
+    /// Part of the run that passes before the motion is measured, s; the run is 1200 s unless --time says otherwise
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 200.0,
+        allow_negative_numbers = true
+    )]
+    transient: f64,
+    /// Synchronisation: weakest coupling that is tried, 1/s
+    #[arg(long, value_name = "PER_S", default_value_t = Search::default().from_per_s, allow_negative_numbers = true)]
+    coupling_from: f64,
+    /// Synchronisation: strongest coupling that is tried, 1/s
+    #[arg(long, value_name = "PER_S", default_value_t = Search::default().to_per_s, allow_negative_numbers = true)]
+    coupling_to: f64,
+    /// Synchronisation: width at which the bisection ends, 1/s
+    #[arg(long, value_name = "PER_S", default_value_t = Search::default().tolerance_per_s, allow_negative_numbers = true)]
+    tolerance: f64,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
+enum Choice {
+    /// Tangent dynamics
+    Tangent,
+    /// Two neighbouring motions
+    Twin,
+    /// The least coupling that synchronises, the paper's method, equations (17) to (19)
+    Synchronisation,
+    /// These three
+    All,
+    /// Equation (20) as printed: a conditional exponent, not the largest one
+    PrintedResponse,
+}
+
+/// Length of the run unless `--time` says otherwise, s.
+const TIME_S: f64 = 1200.0;
+/// Less than this behind the transient, some eighty cycles, has no standard error worth its name, s.
+const LEAST_OBSERVED_S: f64 = 100.0;
+/// Work that takes longer than this is announced, s.
+const ANNOUNCED_S: f64 = 10.0;
+
+#[derive(Serialize)]
+struct Results<'a> {
+    transient_s: f64,
+    observed_s: f64,
+    search: Search,
+    complete: bool,
+    exponents: &'a [Estimate],
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenarios = speeds(arguments)?;
+    let timing = timing(arguments)?;
+    let search = Search {
+        from_per_s: arguments.coupling_from,
+        to_per_s: arguments.coupling_to,
+        tolerance_per_s: arguments.tolerance,
+    }
+    .validated()?;
+    arguments.destinations.check_free()?;
+    let methods = methods(arguments);
+    let points: Vec<(Scenario<f64>, Method)> = scenarios
+        .iter()
+        .flat_map(|&scenario| methods.iter().map(move |&method| (scenario, method)))
+        .collect();
+    announce(&scenarios, &methods, timing, search)?;
+    let (estimates, done) = measure(&points, timing, search)?;
+    show(&estimates);
+    let results = Results {
+        transient_s: timing.transient_s,
+        observed_s: timing.observed_s,
+        search,
+        complete: done == points.len(),
+        exponents: &estimates,
+    };
+    arguments.destinations.write(&estimates, &results, || {
+        chart(&estimates, &methods, timing).svg()
+    })?;
+    if done < points.len() {
+        eprintln!(
+            "stopped: {done} of {} points are done; their results are shown, and written where files were asked for",
+            points.len()
+        );
+        return Ok(Done::Code(COULD_NOT_RUN));
+    }
+    Ok(Done::Well)
+}
+
+/// One scenario for each speed, checked.
+fn speeds(arguments: &Arguments) -> anyhow::Result<Vec<Scenario<f64>>> {
+    let scenario = arguments.run.scenario()?;
+    let (Some(from), Some(to), Some(step)) = (arguments.from, arguments.to, arguments.step) else {
+        return Ok(vec![scenario]);
+    };
+    let values = Values::new("--from, --to, --step: wheel speed (rpm)", from, to, step)?;
+    Ok(scenarios(&scenario, Parameter::Speed, &values)?)
+}
+
+fn timing(arguments: &Arguments) -> anyhow::Result<Timing> {
+    let time_s = arguments.run.time.unwrap_or(TIME_S);
+    let timing = Timing::new(arguments.transient, time_s)?;
+    ensure!(
+        timing.observed_s >= LEAST_OBSERVED_S,
+        "--time {time_s} with --transient {} leaves {} s to measure: must be at least {LEAST_OBSERVED_S} s",
+        timing.transient_s,
+        timing.observed_s
+    );
+    Ok(timing)
+}
+
+fn methods(arguments: &Arguments) -> Vec<Method> {
+    let tangent = if arguments.spectrum {
+        Method::Spectrum
+    } else {
+        Method::Tangent
+    };
+    let alone = |method| {
+        let spectrum = arguments.spectrum.then_some(Method::Spectrum);
+        spectrum.into_iter().chain([method]).collect()
+    };
+    match arguments.method {
+        Choice::Tangent => vec![tangent],
+        Choice::All => vec![tangent, Method::Twin, Method::Synchronisation],
+        Choice::Twin => alone(Method::Twin),
+        Choice::Synchronisation => alone(Method::Synchronisation),
+        Choice::PrintedResponse => alone(Method::PrintedResponse),
+    }
+}
+
+/// Says what long work will cost, from the time that a few steps take here.
+fn announce(
+    scenarios: &[Scenario<f64>],
+    methods: &[Method],
+    timing: Timing,
+    search: Search,
+) -> anyhow::Result<()> {
+    const TRIAL_STEPS: u32 = 2000;
+    let flow = VehicleFlow::new(&scenarios[0])?;
+    let mut x = flow.start();
+    let start = Instant::now();
+    for _ in 0..TRIAL_STEPS {
+        x = std::hint::black_box(flow.step(&x));
+    }
+    let step = start.elapsed().as_secs_f64() / f64::from(TRIAL_STEPS);
+    let measured = |method: &Method| timing.observed_s * method.steps_per_step(search);
+    let one_speed = methods
+        .iter()
+        .map(|method| timing.transient_s + measured(method))
+        .sum::<f64>()
+        / flow.step_s();
+    let threads = rayon::current_num_threads() as f64;
+    let seconds = one_speed * step * scenarios.len() as f64 / threads;
+    if seconds > ANNOUNCED_S {
+        eprintln!(
+            "{} speeds, {} s each: about {seconds:.0} s of work on {threads} threads; Ctrl-C keeps what is done",
+            scenarios.len(),
+            timing.time_s()
+        );
+    }
+    Ok(())
+}
+
+/// The estimates in the points' order, and how many points are done.
+fn measure(
+    points: &[(Scenario<f64>, Method)],
+    timing: Timing,
+    search: Search,
+) -> anyhow::Result<(Vec<Estimate>, usize)> {
+    let bar = ProgressBar::new(points.len() as u64).with_style(
+        ProgressStyle::with_template("{elapsed_precise} [{bar:40}] {pos}/{len} points, {eta} left")
+            .expect("the template is valid")
+            .progress_chars("=> "),
+    );
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let watch = Watch {
+        stop: &INTERRUPTED,
+        done: &|| bar.inc(1),
+    };
+    let work =
+        |(scenario, method): &(Scenario<f64>, Method)| estimate(scenario, *method, timing, search);
+    let estimates: Vec<_> = watch.points(points, work).into_iter().flatten().collect();
+    bar.finish_and_clear();
+    let done = estimates.len();
+    let estimates: Result<Vec<_>, _> = estimates.into_iter().collect();
+    let estimates = estimates?;
+    Ok((estimates.into_iter().flatten().collect(), done))
+}
+
+fn show(estimates: &[Estimate]) {
+    println!(
+        "{:>8}  {:<22}{:>2}  {:>9}  {:>8}  finding",
+        "rpm", "method", "", "1/s", "error"
+    );
+    for estimate in estimates {
+        let number = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.4}"));
+        let reason = estimate
+            .reason
+            .as_deref()
+            .map(|reason| format!(": {reason}"));
+        println!(
+            "{:>8}  {:<22}{:>2}  {:>9}  {:>8}  {}{}",
+            estimate.wheel_speed_rpm,
+            estimate.method.name(),
+            estimate.index,
+            number(estimate.exponent_per_s),
+            number(estimate.error_per_s()),
+            estimate.finding.words(),
+            reason.unwrap_or_default()
+        );
+    }
+}
+
+/// A panel for each method, the spectrum's two pairs of exponents in one each: figures with bars of a standard error.
+fn chart(estimates: &[Estimate], methods: &[Method], timing: Timing) -> Chart {
+    let panel = |caption: &str, method: Method, indices: std::ops::RangeInclusive<usize>| Panel {
+        caption: caption.into(),
+        x: AxisSpec::linear("wheel speed (rpm)"),
+        y: AxisSpec::linear("exponent (1/s)"),
+        series: indices
+            .enumerate()
+            .flat_map(|(line, index)| {
+                let one = estimates
+                    .iter()
+                    .filter(move |e| e.method == method && e.index == index);
+                series(one, line)
+            })
+            .collect(),
+        levels: if method == Method::Spectrum && caption.contains("third") {
+            vec![]
+        } else {
+            vec![0.0]
+        },
+        ..Panel::default()
+    };
+    let panels = methods.iter().flat_map(|&method| match method {
+        Method::Spectrum => vec![
+            panel("spectrum: first and second", method, 1..=2),
+            panel(
+                "spectrum: third and fourth (none where stick takes a dimension away)",
+                method,
+                3..=4,
+            ),
+        ],
+        _ => vec![panel(method.name(), method, 1..=1)],
+    });
+    Chart {
+        heading: format!("Lyapunov exponents over {} s", timing.observed_s),
+        panels: panels.collect(),
+    }
+}
+
+/// The exponents as a line, and their standard errors as bars.
+fn series<'a>(estimates: impl Iterator<Item = &'a Estimate> + Clone, line: usize) -> [Series; 2] {
+    const GAP: (f64, f64) = (f64::NAN, f64::NAN);
+    let point = |e: &Estimate| {
+        e.exponent_per_s
+            .map_or(GAP, |exponent| (e.wheel_speed_rpm, exponent))
+    };
+    let bar = |e: &Estimate| {
+        let (rpm, exponent) = point(e);
+        let error = e.error_per_s().unwrap_or(f64::NAN);
+        [(rpm, exponent - error), (rpm, exponent + error), GAP]
+    };
+    [
+        Series {
+            label: String::new(),
+            points: estimates.clone().map(point).collect(),
+            look: Look::Line(line),
+        },
+        Series {
+            label: String::new(),
+            points: estimates.flat_map(bar).collect(),
+            look: Look::Line(line),
+        },
+    ]
+}

@@ -1,0 +1,83 @@
+//! What the plots of a settled motion share: their options, and the motion behind its transient.
+
+use super::RunOptions;
+use anyhow::{bail, ensure};
+use clap::Args;
+use shared_model::Scenario;
+use sim_host::simulate::{record, settled};
+use sim_host::trace::Trace;
+
+/// Least and greatest transient, s.
+const TRANSIENTS_S: std::ops::RangeInclusive<f64> = 0.0..=100_000.0;
+/// Most states that are kept in memory.
+const MOST_STATES: u32 = 20_000_000;
+
+/// A run that settles before it is looked at. The dither, if there is one, is on from the start.
+#[derive(Args)]
+pub struct SettledRun {
+    #[command(flatten)]
+    run: RunOptions,
+    /// Time in which the motion settles before the run, s
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 200.0,
+        allow_negative_numbers = true
+    )]
+    pub transient: f64,
+}
+
+impl SettledRun {
+    /// The scenario, checked together with the transient.
+    pub fn scenario(&self) -> anyhow::Result<Scenario<f64>> {
+        let scenario = self.run.scenario()?;
+        ensure!(
+            TRANSIENTS_S.contains(&self.transient),
+            "--transient {}: must be from {} to {} s",
+            self.transient,
+            TRANSIENTS_S.start(),
+            TRANSIENTS_S.end()
+        );
+        Ok(scenario)
+    }
+
+    /// The motion of the scenario behind the transient.
+    pub fn trace(&self, scenario: &Scenario<f64>) -> anyhow::Result<Trace> {
+        ensure!(
+            scenario.steps() <= MOST_STATES,
+            "--time {}: must be at most {} s, which is {MOST_STATES} steps",
+            scenario.run.duration_s,
+            f64::from(MOST_STATES) * scenario.step_s()
+        );
+        let trace = record(&mut settled(scenario, self.transient)?, scenario);
+        if let Some(time_s) = trace.diverges_at_s() {
+            bail!(
+                "the motion diverges: beyond all bounds {time_s} s behind the transient of {} s; nothing was written. Set B of \
+                 Table 1 with the cubic tyre and a negative peak_n do so",
+                self.transient
+            );
+        }
+        Ok(trace)
+    }
+}
+
+/// What a run is, for headings: speed and dither.
+pub fn title(scenario: &Scenario<f64>) -> String {
+    use shared_model::dither::{Application, Waveform};
+    use sim_host::verdict::figure;
+    let dither = &scenario.dither;
+    let waveform = match dither.waveform {
+        Waveform::None => return format!("{} rpm, no dither", scenario.run.wheel_speed_rpm),
+        Waveform::Square => "square",
+        Waveform::Sine => "sine",
+    };
+    let application = match dither.application {
+        Application::Averaged => "averaged",
+        Application::Signal => "as a signal",
+    };
+    format!(
+        "{} rpm, {waveform} dither {} V {application}",
+        scenario.run.wheel_speed_rpm,
+        figure(dither.amplitude_v)
+    )
+}

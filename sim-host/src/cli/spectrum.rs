@@ -1,0 +1,222 @@
+//! `sim-host spectrum`: power spectrum of the settled motion.
+
+use super::Done;
+use super::output::Destinations;
+use super::settled::{SettledRun, title};
+use anyhow::{Context, ensure};
+use serde::Serialize;
+use shared_model::Scenario;
+use shared_model::dither::{Application, Waveform};
+use sim_host::chaos::power_spectrum::{MIN_SEGMENT, PowerSpectrum, welch};
+use sim_host::component::Component;
+use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use std::f64::consts::TAU;
+
+/// Segments of half overlap that a run has by default.
+const SEGMENTS: f64 = 8.0;
+/// Intervals of the frequency axis in the figure.
+const INTERVALS: f64 = 700.0;
+
+/// Power spectrum of the settled motion by Welch's method (Hann window, half overlap, one-sided density).
+///
+/// The dither, if there is one, is applied as the true signal, so that its line shows.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host spectrum --rpm 1750 --time 200 --figure chaos.svg
+  sim-host spectrum --rpm 1750 --dither square --amplitude-v 0.1 --time 60 --figure dither.svg
+  sim-host spectrum --component steering_angle --segment 20 --time 400 --out spectrum.csv
+
+Components: sideslip (beta), yaw_rate (gamma), steering_angle (delta_f), steering_rate (delta_f_dot).")]
+pub struct Arguments {
+    #[command(flatten)]
+    run: SettledRun,
+    /// Component of the state
+    #[arg(long, value_name = "COMPONENT", default_value = "yaw_rate")]
+    component: Component,
+    /// Length of a segment, s; lines closer than 2/SECONDS Hz merge. Without, two ninths of the run: eight segments
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    segment: Option<f64>,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+#[derive(Serialize)]
+struct Row {
+    frequency_hz: f64,
+    density_per_hz: f64,
+}
+
+#[derive(Serialize)]
+struct DitherLine {
+    frequency_rad_per_s: f64,
+    frequency_hz: f64,
+    amplitude: f64,
+    over_surroundings: f64,
+}
+
+#[derive(Serialize)]
+struct Results {
+    wheel_speed_rpm: f64,
+    transient_s: f64,
+    component: Component,
+    density_unit: String,
+    bin_hz: f64,
+    segments: usize,
+    power: f64,
+    peak_hz: f64,
+    dither: Option<DitherLine>,
+    bins: Vec<Row>,
+}
+
+impl Arguments {
+    /// Samples in a segment.
+    fn segment(&self, scenario: &Scenario<f64>) -> anyhow::Result<usize> {
+        let (rate_hz, duration_s) = (scenario.model_rate_hz(), scenario.run.duration_s);
+        let default = 2.0 * duration_s / (SEGMENTS + 1.0);
+        let length_s = self.segment.unwrap_or(default);
+        let least_s = MIN_SEGMENT as f64 / rate_hz;
+        ensure!(
+            length_s >= least_s && length_s <= duration_s,
+            "--segment {length_s}: must be from {least_s} s ({MIN_SEGMENT} samples) to the run's length, --time {duration_s} s"
+        );
+        Ok(((length_s * rate_hz).round() as usize).min(scenario.steps() as usize))
+    }
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let mut scenario = arguments.run.scenario()?;
+    let dithered = scenario.dither.waveform != Waveform::None;
+    if dithered {
+        scenario.dither.application = Application::Signal;
+        scenario.validate()?;
+    }
+    let segment = arguments.segment(&scenario)?;
+    arguments.destinations.check_free()?;
+    let trace = arguments.run.trace(&scenario)?;
+    let component = arguments.component;
+    let (low, high) = trace.range(component.index, 0);
+    ensure!(
+        high - low > 1e-9,
+        "the motion is at rest: {component} ranges from {low} to {high} {}, so it has no spectrum; nothing was written",
+        component.unit
+    );
+    let signal: Vec<f64> = trace.component(component.index).collect();
+    let spectrum = welch(&signal, scenario.model_rate_hz(), segment)?;
+    let results = results(arguments, &scenario, &spectrum).context("nothing was written")?;
+    arguments
+        .destinations
+        .write(&results.bins, &results, || chart(&scenario, &results).svg())?;
+    println!(
+        "{} segments, bins of {:.4} Hz; power {:.6e} ({})\u{b2}, greatest at {:.4} Hz",
+        results.segments, results.bin_hz, results.power, component.unit, results.peak_hz
+    );
+    if let Some(line) = &results.dither {
+        println!(
+            "dither line at {:.3} Hz ({} rad/s): amplitude {:.4e} {}, {:.1} times the density around it",
+            line.frequency_hz,
+            line.frequency_rad_per_s,
+            line.amplitude,
+            component.unit,
+            line.over_surroundings
+        );
+    }
+    Ok(Done::Well)
+}
+
+fn results(
+    arguments: &Arguments,
+    scenario: &Scenario<f64>,
+    spectrum: &PowerSpectrum,
+) -> anyhow::Result<Results> {
+    let frequency_rad_per_s = scenario.dither.frequency_rad_per_s();
+    let frequency_hz = frequency_rad_per_s / TAU;
+    let dither = match scenario.dither.waveform {
+        Waveform::None => None,
+        Waveform::Square | Waveform::Sine => {
+            let line = spectrum.line(frequency_hz).with_context(|| {
+                let least = TAU * spectrum.frequency_hz(4);
+                let most = TAU * spectrum.frequency_hz(spectrum.density.len().saturating_sub(5));
+                format!(
+                    "the dither's {frequency_rad_per_s} rad/s are not within the spectrum, {least} to {most} rad/s"
+                )
+            })?;
+            Some(DitherLine {
+                frequency_rad_per_s,
+                frequency_hz,
+                amplitude: line.amplitude,
+                over_surroundings: line.prominence,
+            })
+        }
+    };
+    let bins = spectrum.density.iter().enumerate();
+    Ok(Results {
+        wheel_speed_rpm: scenario.run.wheel_speed_rpm,
+        transient_s: arguments.run.transient,
+        component: arguments.component,
+        density_unit: format!("({})^2/Hz", arguments.component.unit),
+        bin_hz: spectrum.bin_hz,
+        segments: spectrum.segments,
+        power: spectrum.power(),
+        peak_hz: spectrum.peak_hz(),
+        dither,
+        bins: bins
+            .map(|(k, density)| Row {
+                frequency_hz: spectrum.frequency_hz(k),
+                density_per_hz: *density,
+            })
+            .collect(),
+    })
+}
+
+fn chart(scenario: &Scenario<f64>, results: &Results) -> Chart {
+    // Without its mean the signal has nothing at zero frequency, and a logarithmic axis no place for it.
+    let bins = &results.bins[1..];
+    let ends = (bins[0].frequency_hz, bins[bins.len() - 1].frequency_hz);
+    let instant = |line: &DitherLine| {
+        let label = format!(
+            "dither, {} rad/s = {:.1} Hz",
+            line.frequency_rad_per_s, line.frequency_hz
+        );
+        (line.frequency_hz, label)
+    };
+    let unit = results.component.unit;
+    let panel = Panel {
+        caption: format!(
+            "{} segments, Hann window, half overlap; bins of {:.3} Hz, the greatest in each drawn interval",
+            results.segments, results.bin_hz
+        ),
+        x: AxisSpec::logarithmic("frequency (Hz)").from_to(ends.0, ends.1),
+        y: AxisSpec::logarithmic(format!("density (({unit})\u{b2}/Hz)")),
+        series: vec![Series {
+            label: String::new(),
+            points: envelope(bins, ends),
+            look: Look::Line(0),
+        }],
+        instants: results.dither.iter().map(instant).collect(),
+        ..Panel::default()
+    };
+    Chart {
+        heading: format!(
+            "Power spectrum of {} \u{2013} {}",
+            results.component.title,
+            title(scenario)
+        ),
+        panels: vec![panel],
+    }
+}
+
+/// The bin with the greatest density in each of many intervals of equal length on a logarithmic axis.
+fn envelope(bins: &[Row], (low, high): (f64, f64)) -> Vec<(f64, f64)> {
+    let interval = |row: &Row| {
+        let share = (row.frequency_hz / low).ln() / (high / low).ln();
+        (share * INTERVALS) as i64
+    };
+    bins.chunk_by(|a, b| interval(a) == interval(b))
+        .filter_map(|chunk| {
+            chunk
+                .iter()
+                .max_by(|a, b| a.density_per_hz.total_cmp(&b.density_per_hz))
+        })
+        .map(|row| (row.frequency_hz, row.density_per_hz))
+        .collect()
+}
