@@ -25,6 +25,8 @@ const NEWTON_STEPS: usize = 60;
 const GREATEST_RESIDUAL: f64 = 1e-10;
 /// Closer ones are the same, in every component.
 const SAME: f64 = 1e-7;
+/// Equilibria at neighbouring speeds with slip angles this close are one branch, rad.
+const SAME_BRANCH_RAD: f64 = 1e-3;
 /// Steps in which a stick band is followed from its middle to each end.
 const BAND_STEPS: i32 = 64;
 /// A state of rest this far out of a stick band still belongs to it, rad and rad/s: what the flow still moves.
@@ -73,6 +75,12 @@ impl Equilibrium {
                 (low..=high).contains(&state[k])
             })
         })
+    }
+
+    /// The equilibrium with these slip angles (rad) is this one at another speed: the motor's torque fixes the forces, so the slip angles stay.
+    pub fn is_on_branch(&self, slip_angles_rad: &[f64; 2]) -> bool {
+        let mut pairs = self.slip_angles_rad.iter().zip(slip_angles_rad);
+        pairs.all(|(a, b)| (a - b).abs() < SAME_BRANCH_RAD)
     }
 
     /// The pair of complex eigenvalues with the greatest real part, by the one with positive imaginary part.
@@ -269,6 +277,8 @@ pub struct Hopf {
     pub destabilises: bool,
     /// The equilibrium's state at the upper end.
     pub state: [f64; 4],
+    /// Its slip angles, which the speed does not change, rad.
+    pub slip_angles_rad: [f64; 2],
 }
 
 /// The equilibria at each speed. Speeds not begun are left out.
@@ -343,6 +353,7 @@ fn hopf_between(
         frequency_rad_per_s: pair.im,
         destabilises: below < 0.0,
         state: above.state,
+        slip_angles_rad: above.slip_angles_rad,
     }))
 }
 

@@ -22,14 +22,6 @@ pub enum Component {
 }
 
 impl Component {
-    /// All, with the names that options give them.
-    pub const ALL: [(&'static str, Self); 4] = [
-        ("sideslip", Self::Sideslip),
-        ("yaw-rate", Self::YawRate),
-        ("steering-angle", Self::SteeringAngle),
-        ("steering-rate", Self::SteeringRate),
-    ];
-
     /// Index in a state vector.
     pub fn index(self) -> usize {
         match self {

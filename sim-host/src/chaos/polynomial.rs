@@ -56,8 +56,8 @@ impl std::fmt::Display for Complex {
 
 /// Eigenvalues of a matrix, the greatest real part first, of a pair the positive imaginary part first.
 ///
-/// The characteristic polynomial by Faddeev and LeVerrier, its roots by Durand and Kerner (W. H. Press et al., Numerical
-/// Recipes, section 9.5, on both conditioning and simultaneous iteration). Good to some 1e-10 of the largest for the
+/// The characteristic polynomial by Faddeev and LeVerrier, its roots by Durand and Kerner (I. O. Kerner, Numerische
+/// Mathematik 8 (1966) 290). Good to some 1e-10 of the largest for the
 /// distinct roots of well scaled matrices of up to four rows; near a double root to the square root of that.
 pub fn eigenvalues<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Vec<Complex> {
     // lambda^N + c[N-1] lambda^(N-1) + ... + c[0].
@@ -95,7 +95,7 @@ fn roots<const N: usize>(coefficients: &[f64; N]) -> Vec<Complex> {
         };
         coefficients.iter().rev().fold(real(1.0), horner)
     };
-    // Cauchy's bound: no root is farther out.
+    // Begin on a circle of the size of the roots: the N-th root of Cauchy's bound, which is of the size of their product.
     let radius = 1.0 + coefficients.iter().fold(0.0, |m: f64, c| m.max(c.abs()));
     let radius = radius.powf(1.0 / N as f64);
     let start = |k: usize| {

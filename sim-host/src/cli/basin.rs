@@ -1,13 +1,13 @@
 //! `sim-host basin`: which start ends on which attractor.
 
 use super::output::Destinations;
-use super::sweep::{TransientOptions, check_interrupted, threads, with_progress};
+use super::sweep::{TransientOptions, check_interrupted, large_dots, threads, with_progress};
 use super::{Done, RunOptions};
 use serde::Serialize;
 use sim_host::chaos::attractor::{Attractor, Kind};
-use sim_host::chaos::basin::{Basin, basin};
+use sim_host::chaos::basin::{Basin, Cell, basin};
 use sim_host::chaos::sweep::{Timing, Values};
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::report::chart::{AxisSpec, Chart, Panel};
 
 /// Basins of attraction: which start ends on which attractor, over a grid of sideslip and steering angles.
 ///
@@ -138,15 +138,10 @@ fn name(attractor: &Attractor) -> String {
 
 fn chart(results: &Results) -> Chart {
     let basin = results.basin;
-    let series = |(k, attractor): (usize, &Attractor)| Series {
-        label: name(attractor),
-        points: basin
-            .cells
-            .iter()
-            .filter(|cell| cell.attractor == k)
-            .map(|cell| (cell.sideslip_rad, cell.steering_angle_rad))
-            .collect(),
-        look: Look::Dots,
+    let series = |(k, attractor): (usize, &Attractor)| {
+        let cells = basin.cells.iter().filter(|cell| cell.attractor == k);
+        let start = |cell: &Cell| (cell.sideslip_rad, cell.steering_angle_rad);
+        large_dots(&name(attractor), k, cells.map(start).collect())
     };
     Chart {
         heading: format!("Basins of attraction at {} rpm", results.wheel_speed_rpm),
@@ -154,7 +149,12 @@ fn chart(results: &Results) -> Chart {
             caption: "where the motion ends, by its start".into(),
             x: AxisSpec::linear("sideslip angle at the start (rad)"),
             y: AxisSpec::linear("steering angle at the start (rad)"),
-            series: basin.attractors.iter().enumerate().map(series).collect(),
+            series: basin
+                .attractors
+                .iter()
+                .enumerate()
+                .flat_map(series)
+                .collect(),
             ..Panel::default()
         }],
     }

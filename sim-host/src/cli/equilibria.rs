@@ -1,7 +1,7 @@
 //! `sim-host equilibria`: equilibria, their eigenvalues, and Hopf bifurcations.
 
 use super::output::Destinations;
-use super::sweep::{check_interrupted, with_progress};
+use super::sweep::{check_interrupted, large_dots, with_progress};
 use super::{Done, RunOptions};
 use anyhow::{bail, ensure};
 use serde::Serialize;
@@ -220,16 +220,14 @@ fn chart(results: &Results) -> Chart {
 
 /// The eigenvalues at one speed in the complex plane.
 fn eigenvalue_chart(speed: &Speed) -> Chart {
-    let points = |stable: bool| {
+    let series = |label: &str, stable: bool| {
         let chosen = speed.equilibria.iter().filter(move |e| e.stable == stable);
         let all = chosen.flat_map(|e| &e.eigenvalues_per_s);
-        all.map(|e| (e.re, e.im)).collect()
+        let points = all.map(|e| (e.re, e.im)).collect();
+        large_dots(label, usize::from(!stable), points)
     };
-    let series = |label: &str, stable| Series {
-        label: label.into(),
-        points: points(stable),
-        look: Look::Dots,
-    };
+    let mut all = series("of stable equilibria", true);
+    all.extend(series("of unstable equilibria", false));
     Chart {
         heading: format!(
             "Eigenvalues of the equilibria at {} rpm",
@@ -238,7 +236,7 @@ fn eigenvalue_chart(speed: &Speed) -> Chart {
         panels: vec![Panel {
             x: AxisSpec::linear("real part (1/s)"),
             y: AxisSpec::linear("imaginary part (1/s)"),
-            series: vec![series("stable", true), series("unstable", false)],
+            series: all,
             instants: vec![(0.0, String::new())],
             ..Panel::default()
         }],
@@ -246,42 +244,79 @@ fn eigenvalue_chart(speed: &Speed) -> Chart {
 }
 
 fn speed_chart(speeds: &[Speed], hopf: &[Hopf]) -> Chart {
-    let series = |label: &str, stable: bool, of: fn(&Equilibrium) -> Option<f64>| {
-        let points = speeds.iter().flat_map(|speed| {
-            let chosen = speed.equilibria.iter().filter(|e| e.stable == stable);
-            chosen.filter_map(|e| Some((speed.wheel_speed_rpm, of(e)?)))
-        });
-        Series {
-            label: label.into(),
-            points: points.collect(),
-            look: Look::Dots,
-        }
+    let all = || {
+        let of = |s: &'_ Speed| s.equilibria.iter().map(|e| e.slip_angles_rad).collect();
+        speeds.iter().flat_map(of as fn(&Speed) -> Vec<[f64; 2]>)
     };
-    let panel = |caption: &str, y: &str, of: fn(&Equilibrium) -> Option<f64>| Panel {
+    let mut branches: Vec<[f64; 2]> = Vec::new();
+    for slip in all() {
+        let near = |b: &[f64; 2]| (b[0] - slip[0]).hypot(b[1] - slip[1]) < 1e-3;
+        if !branches.iter().any(near) {
+            branches.push(slip);
+        }
+    }
+    let bifurcating: Vec<_> = hopf.iter().map(|h| h.slip_angles_rad).collect();
+    let panel = |caption: &str, y: &str, branches: &[[f64; 2]], of: Quantity| Panel {
         caption: caption.into(),
         x: AxisSpec::linear("wheel speed (rpm)"),
         y: AxisSpec::linear(y),
-        series: vec![series("stable", true, of), series("unstable", false, of)],
+        series: branches
+            .iter()
+            .flat_map(|branch| {
+                [("stable", true), ("unstable", false)].map(|(label, stable)| Series {
+                    label: label.into(),
+                    points: branch_points(speeds, branch, stable, of),
+                    look: Look::Line(usize::from(!stable)),
+                })
+            })
+            .filter(|series| series.points.iter().any(|point| point.1.is_finite()))
+            .collect(),
         instants: hopf
             .iter()
-            .map(|h| (0.5 * (h.lower_rpm + h.upper_rpm), "Hopf".into()))
+            .map(|h| {
+                let rpm = 0.5 * (h.lower_rpm + h.upper_rpm);
+                (rpm, format!("Hopf, {rpm:.1}"))
+            })
             .collect(),
         ..Panel::default()
     };
-    let growth = |e: &Equilibrium| Some(e.leading_pair()?.re);
-    let mut growths = panel(
-        "growth of the leading pair of complex eigenvalues",
-        "real part (1/s)",
-        growth,
-    );
-    growths.levels = vec![0.0];
+    let angle: Quantity = |e| Some(e.state[STEERING_ANGLE]);
+    let growth: Quantity = |e| Some(e.leading_pair()?.re);
+    let mut panels = vec![panel(
+        "steering angle at rest",
+        "steering angle (rad)",
+        &branches,
+        angle,
+    )];
+    if !hopf.is_empty() {
+        let caption = "growth of the pair of eigenvalues that changes stability";
+        let mut growths = panel(caption, "real part (1/s)", &bifurcating, growth);
+        growths.levels = vec![0.0];
+        panels.push(growths);
+    }
     Chart {
         heading: "Equilibria over wheel speed".into(),
-        panels: vec![
-            panel("steering angle at rest", "steering angle (rad)", |e| {
-                Some(e.state[STEERING_ANGLE])
-            }),
-            growths,
-        ],
+        panels,
     }
+}
+
+/// What a chart shows of an equilibrium.
+type Quantity = fn(&Equilibrium) -> Option<f64>;
+
+/// A branch's stable or unstable part over the speed; NaN interrupts the line elsewhere.
+fn branch_points(
+    speeds: &[Speed],
+    branch: &[f64; 2],
+    stable: bool,
+    of: Quantity,
+) -> Vec<(f64, f64)> {
+    let value = |speed: &Speed| {
+        let mut on = speed.equilibria.iter().filter(|e| e.is_on_branch(branch));
+        on.find(|e| e.stable == stable).and_then(of)
+    };
+    let point = |speed| (speed, f64::NAN);
+    speeds
+        .iter()
+        .map(|s| value(s).map_or(point(s.wheel_speed_rpm), |y| (s.wheel_speed_rpm, y)))
+        .collect()
 }

@@ -10,7 +10,7 @@ use sim_host::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch};
 use sim_host::motion::Motion;
 use sim_host::paper::REGION_EDGES_RPM;
 use sim_host::pil::qemu::INTERRUPTED;
-use sim_host::report::chart::Region;
+use sim_host::report::chart::{Look, Region, Series};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -169,4 +169,29 @@ pub fn paper_regions(parameter: Parameter, from: f64, to: f64) -> Vec<Region> {
     };
     let all = edges.windows(2).zip(["I", "II", "III", "IV"]).map(region);
     all.filter(|region| region.to > region.from).collect()
+}
+
+/// More dots than this are drawn small: so many large ones would hide each other.
+const MOST_LARGE_DOTS: usize = 3000;
+/// Colours of dots before they repeat.
+const COLOURS: usize = 4;
+
+/// The `n`-th set of dots of a panel, to be seen one by one: a name for the legend, and each dot as a line of one point.
+pub fn large_dots(label: &str, n: usize, points: Vec<(f64, f64)>) -> Vec<Series> {
+    let named = Series {
+        label: label.into(),
+        points: points.clone(),
+        look: Look::Dots,
+    };
+    if points.len() > MOST_LARGE_DOTS {
+        return vec![named];
+    }
+    let large = |point| Series {
+        label: String::new(),
+        points: vec![point],
+        look: Look::Line(n % COLOURS),
+    };
+    std::iter::once(named)
+        .chain(points.into_iter().map(large))
+        .collect()
 }

@@ -1,0 +1,145 @@
+//! The subcommands that sweep, as a user meets them: bad input, the same bytes for any number of threads, no NaN.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn sim_host(folder: &Path, threads: &str, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sim-host"))
+        .args(line.split_whitespace())
+        .env("RAYON_NUM_THREADS", threads)
+        .current_dir(folder)
+        .output()
+        .expect("the program starts")
+}
+
+/// Expects exit code 2, a message with all of `parts`, and no file.
+fn assert_refused(line: &str, parts: &[&str]) {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let output = sim_host(folder.path(), "2", &format!("{line} --out o.csv"));
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{line}: {message} lacks {part:?}");
+    }
+    assert!(!folder.path().join("o.csv").exists(), "{line}");
+}
+
+#[test]
+fn ranges_are_checked() {
+    for command in ["orbit", "regions"] {
+        let line = |rest: &str| format!("{command} {rest}");
+        assert_refused(
+            &line("--from 1900 --to 1600"),
+            &["from 1900 to 1600", "reversed"],
+        );
+        assert_refused(
+            &line("--from 1600 --to 1900 --step 0"),
+            &["in steps of 0", "greater than 0"],
+        );
+        assert_refused(&line("--step -1"), &["in steps of -1", "greater than 0"]);
+        assert_refused(&line("--from nan"), &["from NaN", "finite"]);
+        assert_refused(
+            &line("--from 0 --to 10 --step 5"),
+            &["run.wheel_speed_rpm = 0", "from 1"],
+        );
+        assert_refused(&line("--step 1e-9"), &["more than ten million"]);
+        assert_refused(
+            &line("--over amplitude"),
+            &["waveform is none", "square or sine"],
+        );
+        assert_refused(
+            &line("--over amplitude --dither square --from 5 --to 20 --step 1"),
+            &["bus_voltage"],
+        );
+        assert_refused(
+            &line("--time 100"),
+            &["100 s", "transient of 200 s", "shorter"],
+        );
+        assert_refused(
+            &line("--transient -5"),
+            &["transient of -5 s", "at least 0"],
+        );
+        assert_refused(
+            &line("--from 1000 --to 2000 --step 0.04"),
+            &["model steps", "--yes"],
+        );
+    }
+    assert_refused("regions --width 0", &["--width 0", "at least"]);
+    assert_refused("regions --width nan", &["--width NaN", "finite"]);
+    assert_refused(
+        "basin --beta-from 0.3 --beta-to -0.3",
+        &["sideslip angle", "reversed"],
+    );
+    assert_refused(
+        "basin --delta-step 0",
+        &["steering angle", "greater than 0"],
+    );
+    assert_refused("basin --beta-step 0.001 --delta-step 0.001", &["--yes"]);
+    assert_refused("equilibria --from 2000 --to 1000", &["reversed"]);
+    assert_refused("equilibria --from 1000", &["--to"]);
+    assert_refused("equilibria --rpm 1750 --time 10", &["--time 10"]);
+    assert_refused("equilibria --rpm 0", &["run.wheel_speed_rpm = 0"]);
+}
+
+#[test]
+fn a_section_that_is_never_crossed_is_said_with_the_motions_bounds() {
+    assert_refused(
+        "orbit --from 1600 --to 1610 --step 10 --transient 20 --time 40 --section steering-angle --level 3",
+        &["steering angle (rad) = 3", "never crossed", "stay from"],
+    );
+    assert_refused(
+        "orbit --from 1600 --to 1600 --section steering-angle --level inf",
+        &["--level inf", "finite"],
+    );
+}
+
+/// Every command, with one thread and with three.
+#[test]
+fn the_number_of_threads_does_not_change_the_bytes() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    for (k, command) in [
+        "orbit --from 1600 --to 1700 --step 10 --transient 20 --time 60",
+        "orbit --from 1600 --to 1640 --step 10 --transient 20 --time 60 --start down",
+        "regions --from 1600 --to 1660 --step 20 --width 5 --transient 20 --time 100",
+        "equilibria --from 1600 --to 1700",
+        "basin --beta-step 0.2 --delta-step 0.4 --transient 20 --time 60",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let files = ["1", "3"].map(|threads| {
+            let name = format!("{k}-{threads}");
+            let line = format!("{command} --out {name}.csv --json {name}.json --figure {name}.svg");
+            let output = sim_host(folder.path(), threads, &line);
+            let message = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{command}: {message}");
+            ["csv", "json", "svg"].map(|kind| {
+                fs::read_to_string(folder.path().join(format!("{name}.{kind}"))).expect("written")
+            })
+        });
+        assert_eq!(files[0], files[1], "{command}");
+        let [csv, json, _] = &files[0];
+        assert!(csv.lines().count() > 2, "{csv}");
+        assert!(!csv.contains("NaN") && !csv.contains("inf"), "{command}");
+        serde_json::from_str::<serde_json::Value>(json).expect("JSON");
+    }
+}
+
+#[test]
+fn diverging_motions_are_named_and_have_no_numbers() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let start = "[run]\nsideslip_rad = 8\nsteering_angle_rad = -8\n";
+    fs::write(folder.path().join("far.toml"), start).expect("the file can be written");
+    for command in ["orbit", "regions"] {
+        let line = format!(
+            "{command} --config far.toml --from 1750 --to 1750 --transient 5 --time 10 --out {command}.csv --figure f.svg --force"
+        );
+        let output = sim_host(folder.path(), "2", &line);
+        assert_eq!(output.status.code(), Some(0), "{command}: {output:?}");
+        let csv =
+            fs::read_to_string(folder.path().join(format!("{command}.csv"))).expect("written");
+        assert!(csv.contains("diverges"), "{csv}");
+        assert!(!csv.contains("NaN") && !csv.contains("inf"), "{csv}");
+    }
+}
