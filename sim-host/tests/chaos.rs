@@ -1,12 +1,12 @@
 //! The measures of chaos against something independent.
 
 use shared_model::Scenario;
-use shared_model::controller::Ecu;
 use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;
-use shared_model::vehicle::State;
+use sim_host::chaos::flow::VehicleFlow;
 use sim_host::chaos::lyapunov::{Exponent, largest};
 use sim_host::chaos::period::{Period, TOLERANCE, period};
+use sim_host::chaos::twin;
 use sim_host::simulate::{settle, simulate, started_at};
 use sim_host::trace::Trace;
 
@@ -26,32 +26,12 @@ fn exponent(scenario: &Scenario<f64>) -> Exponent {
     largest(scenario, &trace, 0).expect("the run is long enough")
 }
 
-/// The same by two neighbouring motions, brought back to their distance every tenth of a second: no derivative at all.
+/// The same by two neighbouring motions, which take no derivative and do not go through the ECU's program.
 fn twin_exponent_per_s(scenario: &Scenario<f64>) -> f64 {
-    const DISTANCE: f64 = 1e-8;
-    const INTERVAL: u32 = 100;
-    let mut first = Ecu::new(scenario).expect("the scenario is valid");
-    let mut second = first.clone();
-    let mut start = *second.control.state();
-    start.x[0] += DISTANCE;
-    second.control.set_state(start);
-    let mut growth = 0.0;
-    let mut counted = 0;
-    for k in 0..scenario.steps() {
-        let a = *first.step(|_| {});
-        let b = *second.step(|_| {});
-        if (k + 1) % INTERVAL == 0 {
-            let apart = b.x - a.x;
-            let distance = apart.dot(&apart).sqrt();
-            let x = a.x + apart * (DISTANCE / distance);
-            second.control.set_state(State { x, ..b });
-            if k > scenario.steps() / 10 {
-                growth += (distance / DISTANCE).ln();
-                counted += INTERVAL;
-            }
-        }
-    }
-    growth / (f64::from(counted) * scenario.step_s())
+    let flow = VehicleFlow::new(scenario).expect("the scenario is valid");
+    let exponent = twin::largest(&flow, &flow.start(), scenario.run.duration_s);
+    let exponent = exponent.expect("the motion is bounded");
+    exponent.expect("the motions stay apart").per_s
 }
 
 #[test]

@@ -16,7 +16,7 @@ use shared_model::friction::FrictionMode;
 use shared_model::vehicle::{STEERING_ANGLE, STEERING_RATE};
 
 /// Starts from which the search is repeated.
-const STARTS: usize = 16;
+const STARTS: usize = 32;
 /// A finer bisection would only look at rounding, 1/s.
 const LEAST_TOLERANCE_PER_S: f64 = 1e-9;
 /// Distance at which the response begins, and begins anew.
@@ -109,9 +109,9 @@ pub enum NoThreshold {
 }
 
 /// Largest Lyapunov exponent of the motion from `start` over `time_s`: the least coupling at which the response (17) follows
-/// the drive, by bisection, separately from 16 starts along the motion.
+/// the drive, by bisection, separately from 32 starts along the motion.
 ///
-/// Each coupling is judged by whether the distance grows or decays on the whole over a sixteenth of the time. The distance begins
+/// Each coupling is judged by whether the distance grows or decays on the whole over a thirty-second of the time. The distance begins
 /// anew at 1e-8 whenever it leaves 1e-11 to 1e-5, and what it had grown counts: so neither a burst nor rounding decides. The
 /// response begins on the side of the drive on which it was at the end of the start before (which side does not depend on
 /// the coupling), and for the first start after a tenth of the time that is not counted.

@@ -267,47 +267,51 @@ fn show(estimates: &[Estimate]) {
     }
 }
 
-/// A panel for each method, the spectrum's two pairs of exponents in one each: figures with bars of a standard error.
+/// A panel for each method, for the spectrum one for each pair of exponents.
 fn chart(estimates: &[Estimate], methods: &[Method], timing: Timing) -> Chart {
-    let panel = |caption: &str, method: Method, indices: std::ops::RangeInclusive<usize>| Panel {
+    let panel = |caption: &str, method: Method, first: usize, labels: &[&str]| Panel {
         caption: caption.into(),
         x: AxisSpec::linear("wheel speed (rpm)"),
         y: AxisSpec::linear("exponent (1/s)"),
-        series: indices
+        series: labels
+            .iter()
             .enumerate()
-            .flat_map(|(line, index)| {
-                let one = estimates
-                    .iter()
-                    .filter(move |e| e.method == method && e.index == index);
-                series(one, line)
+            .flat_map(|(line, label)| {
+                let chosen = move |e: &&Estimate| e.method == method && e.index == first + line;
+                series(label, estimates.iter().filter(chosen), line)
             })
             .collect(),
-        levels: if method == Method::Spectrum && caption.contains("third") {
-            vec![]
-        } else {
-            vec![0.0]
-        },
+        levels: if first == 1 { vec![0.0] } else { vec![] },
         ..Panel::default()
     };
+    const PAIR: [&str; 2] = ["first or third exponent", "second or fourth"];
     let panels = methods.iter().flat_map(|&method| match method {
         Method::Spectrum => vec![
-            panel("spectrum: first and second", method, 1..=2),
+            panel("spectrum: first and second", method, 1, &PAIR),
             panel(
                 "spectrum: third and fourth (none where stick takes a dimension away)",
                 method,
-                3..=4,
+                3,
+                &PAIR,
             ),
         ],
-        _ => vec![panel(method.name(), method, 1..=1)],
+        _ => vec![panel(method.name(), method, 1, &[""])],
     });
     Chart {
-        heading: format!("Lyapunov exponents over {} s", timing.observed_s),
+        heading: format!(
+            "Lyapunov exponents over {} s, with one standard error",
+            timing.observed_s
+        ),
         panels: panels.collect(),
     }
 }
 
 /// The exponents as a line, and their standard errors as bars.
-fn series<'a>(estimates: impl Iterator<Item = &'a Estimate> + Clone, line: usize) -> [Series; 2] {
+fn series<'a>(
+    label: &str,
+    estimates: impl Iterator<Item = &'a Estimate> + Clone,
+    line: usize,
+) -> [Series; 2] {
     const GAP: (f64, f64) = (f64::NAN, f64::NAN);
     let point = |e: &Estimate| {
         e.exponent_per_s
@@ -320,7 +324,7 @@ fn series<'a>(estimates: impl Iterator<Item = &'a Estimate> + Clone, line: usize
     };
     [
         Series {
-            label: String::new(),
+            label: label.into(),
             points: estimates.clone().map(point).collect(),
             look: Look::Line(line),
         },
