@@ -5,6 +5,7 @@ mod characteristics;
 mod claims;
 mod errata;
 mod figures;
+mod measures;
 mod page;
 mod piece;
 mod sensitivity;

@@ -1,7 +1,9 @@
 //! A piece of the reproduction: made at once, written at once, kept for the next run.
 
 use super::claims::Judgement;
-use super::{Made, Options, Quality, characteristics, errata, figures, sensitivity, sweeps};
+use super::{
+    Made, Options, Quality, characteristics, errata, figures, measures, sensitivity, sweeps,
+};
 use crate::chaos::sweep::Watch;
 use crate::report::chart::Chart;
 use crate::report::file;
@@ -120,6 +122,16 @@ pub fn all(options: &Options) -> Vec<Piece> {
             "suppression",
             "Figures 12 and 17: chaos suppressed",
             figures::suppression,
+        );
+        piece(
+            "exponents",
+            "All Lyapunov exponents, by three methods",
+            measures::exponents,
+        );
+        piece(
+            "motion",
+            "Poincar\u{e9} section and frequency spectrum",
+            measures::motion,
         );
         piece(
             "averaging",
