@@ -242,3 +242,32 @@ fn starts_end_on_the_attractors_of_both_lobes_or_diverge() {
     let away = basin(&scenario, &beta, &delta, timing(200.0, 400.0), WATCH).expect("valid");
     assert_eq!(away.attractors[0].kind, Kind::Diverges);
 }
+
+/// Friction holds a vehicle that has come to rest: upwards the cycle lasts beyond 1.14 V, downwards rest does.
+#[test]
+fn hysteresis_shows_where_two_attractors_coexist() {
+    let mut scenario = at(1750.0);
+    scenario.dither.waveform = Waveform::Sine;
+    let range = values(1.14, 1.2, 0.02);
+    let at_least_amplitude = |start| {
+        let points = diagram(
+            &scenario,
+            Parameter::Amplitude,
+            &range,
+            Section::YawRateMaxima,
+            timing(200.0, 300.0),
+            start,
+            WATCH,
+        )
+        .expect("the diagram is valid");
+        points[0].orbit.clone()
+    };
+    assert!(matches!(
+        at_least_amplitude(Start::Up),
+        Outcome::Meets { .. }
+    ));
+    assert!(matches!(
+        at_least_amplitude(Start::Down),
+        Outcome::Rests { .. }
+    ));
+}

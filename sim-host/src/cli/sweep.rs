@@ -42,7 +42,7 @@ pub struct RangeOptions {
     /// Greatest value, rpm or V [default: 1900 rpm; 0.14 V of square wave, 1.4 V of sine]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     to: Option<f64>,
-    /// Step, rpm or V [default: a 70th of 350 rpm or of the range of amplitudes]
+    /// Step, rpm or V [default: 5 rpm; 0.002 V of square wave, 0.02 V of sine]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     step: Option<f64>,
 }
