@@ -23,44 +23,50 @@ pub struct Component {
 }
 
 impl Component {
+    /// Sideslip angle beta.
+    pub const SIDESLIP: Self = Self {
+        index: SIDESLIP,
+        name: "sideslip",
+        letter: "beta",
+        column: "sideslip_rad",
+        title: "sideslip angle \u{3b2}",
+        unit: "rad",
+    };
+    /// Yaw rate gamma.
+    pub const YAW_RATE: Self = Self {
+        index: YAW_RATE,
+        name: "yaw_rate",
+        letter: "gamma",
+        column: "yaw_rate_rad_per_s",
+        title: "yaw rate \u{3b3}",
+        unit: "rad/s",
+    };
+    /// Front steering angle delta_f.
+    pub const STEERING_ANGLE: Self = Self {
+        index: STEERING_ANGLE,
+        name: "steering_angle",
+        letter: "delta_f",
+        column: "steering_angle_rad",
+        title: "steering angle \u{3b4}f",
+        unit: "rad",
+    };
+    /// Rate of the front steering angle.
+    pub const STEERING_RATE: Self = Self {
+        index: STEERING_RATE,
+        name: "steering_rate",
+        letter: "delta_f_dot",
+        column: "steering_rate_rad_per_s",
+        title: "steering rate d\u{3b4}f/dt",
+        unit: "rad/s",
+    };
     /// All of them, in the state's order.
     pub const ALL: [Self; 4] = [
-        Self {
-            index: SIDESLIP,
-            name: "sideslip",
-            letter: "beta",
-            column: "sideslip_rad",
-            title: "sideslip angle \u{3b2}",
-            unit: "rad",
-        },
-        Self {
-            index: YAW_RATE,
-            name: "yaw_rate",
-            letter: "gamma",
-            column: "yaw_rate_rad_per_s",
-            title: "yaw rate \u{3b3}",
-            unit: "rad/s",
-        },
-        Self {
-            index: STEERING_ANGLE,
-            name: "steering_angle",
-            letter: "delta_f",
-            column: "steering_angle_rad",
-            title: "steering angle \u{3b4}f",
-            unit: "rad",
-        },
-        Self {
-            index: STEERING_RATE,
-            name: "steering_rate",
-            letter: "delta_f_dot",
-            column: "steering_rate_rad_per_s",
-            title: "steering rate d\u{3b4}f/dt",
-            unit: "rad/s",
-        },
+        Self::SIDESLIP,
+        Self::YAW_RATE,
+        Self::STEERING_ANGLE,
+        Self::STEERING_RATE,
     ];
-}
 
-impl Component {
     /// Name, symbol and unit, for axes.
     ///
     /// ```

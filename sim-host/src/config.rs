@@ -108,6 +108,27 @@ pub fn to_toml(scenario: &Scenario<f64>) -> String {
     table_of(scenario).to_string()
 }
 
+/// The parameters in which a scenario differs from the paper's (the preset `reconstruction`), each as `key = value (paper's
+/// value)`.
+pub fn differences(scenario: &Scenario<f64>) -> Vec<String> {
+    let mut differences = Vec::new();
+    let paper = table_of(&Scenario::reconstruction());
+    compare("", &table_of(scenario), &paper, &mut differences);
+    differences
+}
+
+fn compare(prefix: &str, own: &Table, paper: &Table, differences: &mut Vec<String>) {
+    for ((name, own), paper) in own.iter().zip(paper.values()) {
+        match (own, paper) {
+            (Value::Table(own), Value::Table(paper)) => {
+                compare(&format!("{prefix}{name}."), own, paper, differences);
+            }
+            _ if own == paper => {}
+            _ => differences.push(format!("{prefix}{name} = {own} ({paper})")),
+        }
+    }
+}
+
 fn table_of(scenario: &Scenario<f64>) -> Table {
     Table::try_from(scenario).expect("a scenario is plain tables and values")
 }

@@ -6,10 +6,11 @@ use sim_host::chaos::attractor::{Kind, attractor};
 use sim_host::chaos::basin::basin;
 use sim_host::chaos::equilibria;
 use sim_host::chaos::extrema::Extrema;
-use sim_host::chaos::orbit::{Component, Outcome, Point, Section, Start, diagram};
+use sim_host::chaos::orbit::{Outcome, Point, Section, Start, diagram};
 use sim_host::chaos::period::yaw_rate_maxima;
 use sim_host::chaos::regions::{Regions, coexisting, regions};
 use sim_host::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, mirrored};
+use sim_host::component::Component;
 use sim_host::simulate::simulate;
 use std::sync::atomic::AtomicBool;
 
@@ -172,7 +173,7 @@ fn continuation_upwards_and_downwards_agree_on_a_period() {
 fn sections_are_crossed_or_said_not_to_be() {
     let range = values(1600.0, 1600.0, 1.0);
     let section = |level| Section::Rising {
-        component: Component::SteeringAngle,
+        component: Component::STEERING_ANGLE,
         level,
     };
     let points = orbit(&at(1600.0), &range, section(0.3), Start::Fixed);

@@ -3,45 +3,10 @@
 use crate::chaos::extrema::Extrema;
 use crate::chaos::period::AT_REST_RAD_PER_S;
 use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, scenarios};
+use crate::component::Component;
 use crate::motion::Motion;
 use shared_model::Scenario;
-use shared_model::vehicle::{SIDESLIP, STEERING_ANGLE, STEERING_RATE, State, YAW_RATE};
-
-/// A component of the state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Component {
-    /// Sideslip angle beta, rad.
-    Sideslip,
-    /// Yaw rate gamma, rad/s.
-    YawRate,
-    /// Front steering angle delta_f, rad.
-    SteeringAngle,
-    /// Steering rate, rad/s.
-    SteeringRate,
-}
-
-impl Component {
-    /// Index in a state vector.
-    pub fn index(self) -> usize {
-        match self {
-            Self::Sideslip => SIDESLIP,
-            Self::YawRate => YAW_RATE,
-            Self::SteeringAngle => STEERING_ANGLE,
-            Self::SteeringRate => STEERING_RATE,
-        }
-    }
-
-    /// Name with unit.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sideslip => "sideslip angle (rad)",
-            Self::YawRate => "yaw rate (rad/s)",
-            Self::SteeringAngle => "steering angle (rad)",
-            Self::SteeringRate => "steering rate (rad/s)",
-        }
-    }
-}
+use shared_model::vehicle::{State, YAW_RATE};
 
 /// Where the orbit is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -64,10 +29,10 @@ impl Section {
     pub fn shown(self) -> Component {
         match self {
             Self::Rising {
-                component: Component::YawRate,
+                component: Component::YAW_RATE,
                 ..
-            } => Component::Sideslip,
-            _ => Component::YawRate,
+            } => Component::SIDESLIP,
+            _ => Component::YAW_RATE,
         }
     }
 }
@@ -195,7 +160,7 @@ fn check_crossed(section: Section, points: &[Point]) -> Result<(), SweepError> {
     let join = |(low, high): (f64, f64), p: &Point| (low.min(p.extent.0), high.max(p.extent.1));
     let (low, high) = points.iter().filter(missed).fold(empty, join);
     Err(SweepError::SectionNotCrossed {
-        component: component.name(),
+        component: component.label(),
         level,
         low,
         high,
@@ -220,21 +185,21 @@ fn orbit(
         return Ok(diverges(diverged.time_s));
     }
     let component = match section {
-        Section::YawRateMaxima => Component::YawRate,
+        Section::YawRateMaxima => Component::YAW_RATE,
         Section::Rising { component, .. } => component,
     };
     let step_s = motion.step_s();
-    let shown = section.shown().index();
+    let shown = section.shown().index;
     let mut extrema = Extrema::default();
     let mut values = Vec::new();
     let mut previous = motion.state().x;
     let mut extent = (f64::INFINITY, f64::NEG_INFINITY);
     let seen = motion.observe(timing.observed_s, |time_s, state| {
-        let now = state.x[component.index()];
+        let now = state.x[component.index];
         extent = (extent.0.min(now), extent.1.max(now));
         extrema.push(time_s, step_s, state.x[YAW_RATE]);
         if let Section::Rising { level, .. } = section {
-            let before = previous[component.index()];
+            let before = previous[component.index];
             if before < level && now >= level {
                 let share = (level - before) / (now - before);
                 values.push(previous[shown] + share * (state.x[shown] - previous[shown]));

@@ -101,7 +101,7 @@ pub enum SweepError {
     )]
     SectionNotCrossed {
         /// The section's component, with its unit.
-        component: &'static str,
+        component: String,
         /// Its level.
         level: f64,
         /// Least value of the component on all motions.

@@ -27,7 +27,7 @@ use clap::{Args, Parser, Subcommand};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::settings::Choice;
-use sim_host::config::{ConfigError, load, validate};
+use sim_host::config::{ConfigError, differences, load, validate};
 use sim_host::pil::qemu::INTERRUPTED;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -138,8 +138,25 @@ struct ConfigOptions {
 }
 
 impl ConfigOptions {
+    /// The scenario. Of a file it is said in which parameters it differs from the paper's.
     fn load(&self) -> Result<Scenario<f64>, ConfigError> {
-        load(self.config.as_deref(), self.preset.as_deref())
+        let scenario = load(self.config.as_deref(), self.preset.as_deref())?;
+        if self.config.is_some() {
+            say_differences(&scenario);
+        }
+        Ok(scenario)
+    }
+}
+
+fn say_differences(scenario: &Scenario<f64>) {
+    let differences = differences(scenario);
+    if differences.is_empty() {
+        eprintln!("parameters: the paper's");
+    } else {
+        eprintln!(
+            "parameters that differ from the paper's: {}",
+            differences.join(", ")
+        );
     }
 }
 

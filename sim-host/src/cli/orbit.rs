@@ -8,8 +8,9 @@ use super::{Done, RunOptions};
 use clap::ValueEnum;
 use serde::Serialize;
 use shared_model::Scenario;
-use sim_host::chaos::orbit::{Component, Outcome, Point, Section, Start, diagram};
+use sim_host::chaos::orbit::{Outcome, Point, Section, Start, diagram};
 use sim_host::chaos::sweep::{Parameter, Timing};
+use sim_host::component::Component;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 
 /// Orbit diagram (bifurcation diagram): maxima of the yaw rate, or crossings of a section, over wheel speed or dither
@@ -77,10 +78,10 @@ impl SectionOption {
     fn section(self, level: f64) -> Section {
         let component = match self {
             Self::YawRateMaxima => return Section::YawRateMaxima,
-            Self::Sideslip => Component::Sideslip,
-            Self::YawRate => Component::YawRate,
-            Self::SteeringAngle => Component::SteeringAngle,
-            Self::SteeringRate => Component::SteeringRate,
+            Self::Sideslip => Component::SIDESLIP,
+            Self::YawRate => Component::YAW_RATE,
+            Self::SteeringAngle => Component::STEERING_ANGLE,
+            Self::SteeringRate => Component::STEERING_RATE,
         };
         Section::Rising { component, level }
     }
@@ -162,8 +163,8 @@ fn rows(
         wheel_speed_rpm: scenario.run.wheel_speed_rpm,
         dither_amplitude_v: scenario.dither.active_amplitude_v(),
         outcome,
-        yaw_rate_rad_per_s: value.filter(|_| section.shown() == Component::YawRate),
-        sideslip_rad: value.filter(|_| section.shown() == Component::Sideslip),
+        yaw_rate_rad_per_s: value.filter(|_| section.shown() == Component::YAW_RATE),
+        sideslip_rad: value.filter(|_| section.shown() == Component::SIDESLIP),
         diverges_at_s,
     };
     match &point.orbit {
@@ -199,7 +200,7 @@ fn chart(results: &Results) -> Chart {
             Outcome::Misses | Outcome::Diverges { .. } => Vec::new(),
         }
     };
-    let (name, shown) = (results.parameter.name(), results.shown.name());
+    let (name, shown) = (results.parameter.name(), results.shown.label());
     let first = results.points.first().map_or(0.0, |p| p.value);
     let last = results.points.last().map_or(0.0, |p| p.value);
     let caption = match results.section {
@@ -207,7 +208,7 @@ fn chart(results: &Results) -> Chart {
         Section::Rising { component, level } => {
             format!(
                 "{shown} where the {} rises through {level}",
-                component.name()
+                component.label()
             )
         }
     };

@@ -30,8 +30,8 @@ impl<'a> Output<'a> {
             Some(parent) if parent != Path::new("") => parent,
             _ => Path::new("."),
         };
-        let file = NamedTempFile::new_in(folder)
-            .with_context(|| format!("cannot write into {}", folder.display()))?;
+        let file =
+            temporary(folder).with_context(|| format!("cannot write into {}", folder.display()))?;
         let writer = BufWriter::new(file);
         Ok(Self { path, writer })
     }
@@ -48,6 +48,21 @@ impl<'a> Output<'a> {
         file.persist(self.path).with_context(failed)?;
         Ok(())
     }
+}
+
+/// A temporary file beside the output, with the permissions that any new file has.
+#[cfg(unix)]
+fn temporary(folder: &Path) -> std::io::Result<NamedTempFile<File>> {
+    use std::os::unix::fs::PermissionsExt;
+    let any = std::fs::Permissions::from_mode(0o666);
+    tempfile::Builder::new()
+        .permissions(any)
+        .tempfile_in(folder)
+}
+
+#[cfg(not(unix))]
+fn temporary(folder: &Path) -> std::io::Result<NamedTempFile<File>> {
+    NamedTempFile::new_in(folder)
 }
 
 /// Where an analysis writes its results. Without any, a summary is all there is.

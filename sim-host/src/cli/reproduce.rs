@@ -87,6 +87,7 @@ fn scenarios(arguments: &Arguments) -> anyhow::Result<Vec<(String, Scenario<f64>
     if let Some(file) = &arguments.config {
         let scenario = load(Some(file), None)?;
         validate(&scenario)?;
+        super::say_differences(&scenario);
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         let plain = |c: char| {
             if c.is_ascii_alphanumeric() {

@@ -164,9 +164,8 @@ pub fn motion(named: &Named, quality: Quality, watch: Watch) -> Made {
 }
 
 fn section(named: &Named, scenario: &Scenario<f64>) -> Result<Drawing, SectionError> {
-    let [_, yaw_rate, ..] = Component::ALL;
     let section = Section {
-        component: yaw_rate,
+        component: Component::YAW_RATE,
         value: 0.0,
         direction: Direction::Rising,
     };
@@ -193,8 +192,8 @@ fn section(named: &Named, scenario: &Scenario<f64>) -> Result<Drawing, SectionEr
             heading: "Poincar\u{e9} section of the chaotic motion".into(),
             panels: vec![Panel {
                 caption: section.to_string(),
-                x: AxisSpec::linear(Component::ALL[0].label()),
-                y: AxisSpec::linear(Component::ALL[2].label()),
+                x: AxisSpec::linear(Component::SIDESLIP.label()),
+                y: AxisSpec::linear(Component::STEERING_ANGLE.label()),
                 series: vec![Series {
                     label: String::new(),
                     points: found
