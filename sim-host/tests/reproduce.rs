@@ -40,7 +40,7 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
     let piece = AtomicUsize::new(0);
     let summary = reproduce(&stopped, &options(), &stop, &|progress| match progress {
         Progress::Begins { number, .. } => piece.store(number, Ordering::Relaxed),
-        Progress::Point if piece.load(Ordering::Relaxed) == 2 => {
+        Progress::Point if piece.load(Ordering::Relaxed) == 3 => {
             stop.store(true, Ordering::Relaxed)
         }
         Progress::Point => {}
