@@ -60,6 +60,11 @@ pub const CLAIMS: [Claim; 8] = [
 /// Edges of the paper's regions I to IV, rpm.
 pub const REGION_EDGES_RPM: [f64; 3] = [1645.0, 1825.0, 1855.0];
 
+/// Whether chaos begins (or else ends) at an edge of the regions with rising speed.
+pub fn chaos_begins_at(edge_rpm: f64) -> bool {
+    edge_rpm != REGION_EDGES_RPM[1]
+}
+
 /// How far a claim was found to hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

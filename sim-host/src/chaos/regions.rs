@@ -29,6 +29,16 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// Chaos in one band begins or ends here: some above and none below, or the other way round.
+    pub fn is_of_chaos(&self, begins: bool) -> bool {
+        let (from, to) = if begins {
+            (self.below, self.above)
+        } else {
+            (self.above, self.below)
+        };
+        from != Kind::Chaos && to == Kind::Chaos
+    }
+
     /// The middle of the interval.
     pub fn middle(&self) -> f64 {
         0.5 * (self.lower + self.upper)

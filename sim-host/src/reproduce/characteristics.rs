@@ -1,5 +1,6 @@
 //! Figures 2, 9 to 11 and 14 to 16, and what of the dither an actuator can produce.
 
+use super::figures::name_of;
 use super::piece::{Drawing, Material, Named, csv_of};
 use super::{Made, Quality};
 use crate::chaos::sweep::Watch;
@@ -38,8 +39,9 @@ pub fn characteristics(named: &Named, _quality: Quality, watch: Watch) -> Made {
         material.drawings.push(Drawing {
             name: format!("figure-{}-{name}", numbers.replace(" to ", "-")),
             caption: format!(
-                "Figures {} ({name}): effective against original nonlinearity under {amplitude_v} V.",
-                numbers.trim_start_matches('0')
+                "Figures {} ({name}): effective against original nonlinearity under a {} of {amplitude_v} V.",
+                numbers.trim_start_matches('0'),
+                name_of(waveform)
             ),
             chart: nonlinearities_chart(&dithered, &rows),
             csv: csv_of(&rows),
@@ -58,7 +60,7 @@ pub fn characteristics(named: &Named, _quality: Quality, watch: Watch) -> Made {
     });
     for demand in demands(scenario, &amplitudes) {
         material.findings.push((
-            format!("Torque of the {:?} dither", demand.waveform).to_lowercase(),
+            format!("Torque of the {} dither", name_of(demand.waveform)),
             format!(
                 "{:.3} rad at {:.0} rad/s need {:.3} MN m; the motor's torque reaches {:.1e} of that amplitude",
                 demand.amplitude_rad,

@@ -2,7 +2,7 @@
 
 use crate::chaos::attractor::Kind;
 use crate::chaos::regions::{Regions, Sample};
-use crate::paper::{CLAIMS, REGION_EDGES_RPM, Reproduced};
+use crate::paper::{CLAIMS, REGION_EDGES_RPM, Reproduced, chaos_begins_at};
 use serde::{Deserialize, Serialize};
 
 /// A claim with its judgement under one preset.
@@ -224,10 +224,8 @@ fn composition(sweep: &Regions, from: f64, to: f64) -> String {
 /// Middle and half width of the edge between chaos in one band and anything else that is nearest to `claimed`. Chaos in three
 /// narrow bands looks much like period-3 in a diagram, so the paper's edges are where the bands have merged.
 fn nearest_edge_of_chaos(sweep: &Regions, claimed: f64) -> Option<(f64, f64)> {
-    let of_chaos = sweep
-        .edges
-        .iter()
-        .filter(|edge| (edge.below == Kind::Chaos) != (edge.above == Kind::Chaos));
+    let begins = chaos_begins_at(claimed);
+    let of_chaos = sweep.edges.iter().filter(|edge| edge.is_of_chaos(begins));
     let apart = |edge: &&crate::chaos::regions::Edge| (edge.middle() - claimed).abs();
     let nearest = of_chaos.min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
     Some((nearest.middle(), 0.5 * (nearest.upper - nearest.lower)))

@@ -18,6 +18,8 @@ const TRANSIENT_S: f64 = 200.0;
 const SHOWN_S: f64 = 15.0;
 const RUN_S: f64 = 60.0;
 const SETTLED_S: f64 = 23.0;
+/// Lowest frequency of dither that is compared with averaging, rad/s.
+const LOWEST_RAD_PER_S: f64 = 200.0;
 /// States shown of a second: the curves are smooth.
 const SHOWN_EVERY: usize = 5;
 
@@ -40,10 +42,7 @@ pub fn suppression(named: &Named, _quality: Quality, watch: Watch) -> Made {
         scenario.dither.amplitude_v = amplitude_v;
         let after = simulate(&scenario)?;
         let ends = period(&after, after.index_after(SETTLED_S), TOLERANCE);
-        let word = match waveform {
-            Waveform::Square => "square",
-            _ => "sine",
-        };
+        let word = name_of(waveform);
         let name = &named.name;
         material.drawings.push(Drawing {
             name: format!("figure-{number}-{name}"),
@@ -62,6 +61,15 @@ pub fn suppression(named: &Named, _quality: Quality, watch: Watch) -> Made {
         (watch.done)();
     }
     Ok(material)
+}
+
+/// The waveform's name.
+pub fn name_of(waveform: Waveform) -> &'static str {
+    match waveform {
+        Waveform::None => "no dither",
+        Waveform::Square => "square",
+        Waveform::Sine => "sine",
+    }
 }
 
 fn points(trace: &Trace, until_s: f64) -> Vec<(f64, f64)> {
@@ -131,12 +139,13 @@ fn table(before: &Trace, after: &Trace) -> Table {
 
 /// The true signal against the averaged system from 200 to 20,000 rad/s.
 pub fn averaging(named: &Named, quality: Quality, watch: Watch) -> Made {
-    let count = match quality {
-        Quality::Quick => 3,
-        Quality::Full => 17,
+    let (count, decades) = match quality {
+        Quality::Quick => (3, 1.3),
+        Quality::Full => (17, 2.0),
     };
+    let share = |k: i32| f64::from(k) / f64::from(count - 1);
     let frequencies: Vec<f64> = (0..count)
-        .map(|k| 200.0 * 100_f64.powf(f64::from(k) / f64::from(count - 1)))
+        .map(|k| LOWEST_RAD_PER_S * 10_f64.powf(decades * share(k)))
         .collect();
     let mut material = Material::default();
     let mut panels = Vec::new();
@@ -166,9 +175,9 @@ pub fn averaging(named: &Named, quality: Quality, watch: Watch) -> Made {
         let apart: Vec<String> = apart
             .map(|one| format!("{:.0}", one.frequency_rad_per_s))
             .collect();
-        let word = format!("{waveform:?} of {amplitude_v} V");
+        let word = format!("{} of {amplitude_v} V", name_of(waveform));
         material.findings.push((
-            format!("Averaging, {}", word.to_lowercase()),
+            format!("Averaging, {word}"),
             match (&apart[..], curves[1].first()) {
                 ([], Some((frequency, swing))) => format!(
                     "same period at all frequencies from {frequency:.0} rad/s on, where the swing differs by {swing:.2} %"

@@ -2,10 +2,9 @@
 
 use super::piece::{Drawing, Material, Named, Table};
 use super::{Made, Quality};
-use crate::chaos::attractor::Kind;
-use crate::chaos::regions::{Regions, regions};
+use crate::chaos::regions::{Edge, Regions, regions};
 use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch};
-use crate::paper::REGION_EDGES_RPM;
+use crate::paper::{REGION_EDGES_RPM, chaos_begins_at};
 use crate::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::Scenario;
 use shared_model::friction::FrictionLaw;
@@ -103,19 +102,12 @@ fn edges(
 }
 
 fn nearest(sweep: &Regions, claimed: f64) -> Option<f64> {
-    let of_chaos =
-        |edge: &&crate::chaos::regions::Edge| is_chaos(edge.below) != is_chaos(edge.above);
-    let middles = sweep
-        .edges
-        .iter()
-        .filter(of_chaos)
-        .map(|edge| edge.middle());
-    let near = middles.filter(|middle| (middle - claimed).abs() <= NEAR_RPM);
+    let begins = chaos_begins_at(claimed);
+    let of_chaos = sweep.edges.iter().filter(|edge| edge.is_of_chaos(begins));
+    let near = of_chaos
+        .map(Edge::middle)
+        .filter(|middle| (middle - claimed).abs() <= NEAR_RPM);
     near.min_by(|a, b| (a - claimed).abs().total_cmp(&(b - claimed).abs()))
-}
-
-fn is_chaos(kind: Kind) -> bool {
-    kind == Kind::Chaos
 }
 
 /// Root mean square distance of the three edges from the paper's, if all three are there.

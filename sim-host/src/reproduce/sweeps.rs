@@ -1,5 +1,6 @@
 //! Sweeps over the speed and over the dither's amplitude: the diagrams of Figures 6, 7, 8 and 13, and the claims on them.
 
+use super::figures::name_of;
 use super::piece::{Drawing, Material, Named, Table};
 use super::{Made, Quality, claims};
 use crate::chaos::regions::{Regions, regions};
@@ -120,10 +121,7 @@ fn amplitude(
         quality,
         watch,
     )?;
-    let word = match waveform {
-        Waveform::Square => "square",
-        _ => "sine",
-    };
+    let word = name_of(waveform);
     let name = &named.name;
     let drawing = Drawing {
         name: format!("figure-{number}-{name}"),
