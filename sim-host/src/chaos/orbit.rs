@@ -160,7 +160,7 @@ fn check_crossed(section: Section, points: &[Point]) -> Result<(), SweepError> {
     let join = |(low, high): (f64, f64), p: &Point| (low.min(p.extent.0), high.max(p.extent.1));
     let (low, high) = points.iter().filter(missed).fold(empty, join);
     Err(SweepError::SectionNotCrossed {
-        component: component.label(),
+        component: component.column.into(),
         level,
         low,
         high,

@@ -56,8 +56,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
                 of,
                 title,
                 kept,
+                done,
             } => {
-                let line = format!("{number}/{of} {title}{}", if kept { ": kept" } else { "" });
+                let note = if kept {
+                    ": kept".into()
+                } else {
+                    time_left(start.elapsed(), done)
+                };
+                let line = format!("{number}/{of} {title}{note}");
                 bar.set_position(0);
                 bar.set_message(line.clone());
                 if bar.is_hidden() {
@@ -81,6 +87,15 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         start.elapsed().as_secs_f64()
     );
     Ok(Done::Well)
+}
+
+/// What is left at the pace so far, once a twentieth is done.
+fn time_left(elapsed: Duration, done: f64) -> String {
+    if done < 0.05 {
+        return String::new();
+    }
+    let left_s = elapsed.as_secs_f64() * (1.0 - done) / done;
+    format!(", about {left_s:.0} s left")
 }
 
 fn scenarios(arguments: &Arguments) -> anyhow::Result<Vec<(String, Scenario<f64>)>> {

@@ -3,6 +3,7 @@
 
 use super::piece::{Drawing, Material, Named, Table, csv_of};
 use super::{Made, Quality};
+use crate::chaos::attractor::{Attractor, attractor};
 use crate::chaos::method::{Estimate, Method, estimate};
 use crate::chaos::poincare::{Direction, Section, SectionError, crossings};
 use crate::chaos::power_spectrum::welch;
@@ -268,5 +269,57 @@ fn spectrum(named: &Named, scenario: &Scenario<f64>) -> Result<Drawing, SweepErr
             }],
         },
         csv: table.csv(),
+    })
+}
+
+/// How the findings depend on the lengths of transient and run.
+pub fn lengths(named: &Named, quality: Quality, watch: Watch) -> Made {
+    let (transients_s, runs_s): (&[f64], &[f64]) = match quality {
+        Quality::Quick => (&[0.0, 60.0], &[60.0, 150.0]),
+        Quality::Full => (&[0.0, 50.0, 200.0, 1000.0], &[100.0, 300.0, 1000.0, 3000.0]),
+    };
+    let longest_s = runs_s[runs_s.len() - 1];
+    let by_transient = transients_s
+        .iter()
+        .map(|&transient_s| (transient_s, longest_s));
+    let by_run = runs_s
+        .iter()
+        .map(|&run_s| (transients_s[transients_s.len() - 1], run_s));
+    let points: Vec<(f64, f64, f64)> = by_transient
+        .chain(by_run)
+        .flat_map(|(transient_s, run_s)| {
+            [1600.0, 1750.0, 1845.0].map(|rpm| (transient_s, run_s, rpm))
+        })
+        .collect();
+    let made = watch.points(&points, |&(transient_s, run_s, rpm)| {
+        let timing = Timing::new(transient_s, transient_s + run_s)?;
+        Ok((
+            transient_s,
+            run_s,
+            rpm,
+            attractor(&at_speed(&named.scenario, rpm), timing, true)?,
+        ))
+    });
+    let made = made
+        .into_iter()
+        .flatten()
+        .collect::<Result<Vec<_>, SweepError>>()?;
+    let findings = made.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).map(|same| {
+        let one = |(_, _, rpm, found): &(f64, f64, f64, Attractor)| {
+            let exponent = found
+                .exponent_per_s
+                .map_or_else(String::new, |exponent| format!(" ({exponent:.3} 1/s)"));
+            format!("{rpm} rpm {}{exponent}", found.kind)
+        };
+        let words: Vec<String> = same.iter().map(one).collect();
+        let (transient_s, run_s) = (same[0].0, same[0].1);
+        (
+            format!("{run_s} s behind {transient_s} s"),
+            words.join(", "),
+        )
+    });
+    Ok(Material {
+        findings: findings.collect(),
+        ..Material::default()
     })
 }

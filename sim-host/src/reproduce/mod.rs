@@ -52,6 +52,8 @@ pub enum Progress {
         title: String,
         /// It was made by an earlier run and is kept.
         kept: bool,
+        /// Share of this run's work that is done, from 0 to 1.
+        done: f64,
     },
     /// A point of the present piece is done.
     Point,
@@ -79,18 +81,28 @@ pub fn reproduce(
     let pieces = piece::all(options);
     let of = pieces.len();
     let mut products = Vec::with_capacity(of);
-    for (k, piece) in pieces.iter().enumerate() {
-        let kept = piece.kept(folder, options);
+    let kept: Vec<Option<Product>> = pieces
+        .iter()
+        .map(|piece| piece.kept(folder, options))
+        .collect();
+    let to_make = pieces.iter().zip(&kept).filter(|(_, kept)| kept.is_none());
+    let all: f64 = to_make.map(|(piece, _)| piece.weight).sum();
+    let mut made = 0.0;
+    for (k, (piece, kept)) in pieces.iter().zip(kept).enumerate() {
         on_progress(Progress::Begins {
             number: k + 1,
             of,
             title: piece.title.clone(),
             kept: kept.is_some(),
+            done: if all > 0.0 { made / all } else { 1.0 },
         });
         let product = match kept {
             Some(product) => product,
             None => match make(piece, folder, options, stop, on_progress)? {
-                Some(product) => product,
+                Some(product) => {
+                    made += piece.weight;
+                    product
+                }
                 None => break,
             },
         };

@@ -19,6 +19,8 @@ pub struct Piece {
     pub name: String,
     /// Name for people.
     pub title: String,
+    /// Its share of the time.
+    pub weight: f64,
     /// What it is made of.
     pub scenario: Named,
     /// Makes it.
@@ -82,71 +84,107 @@ pub struct Product {
     pub findings: Vec<(String, String)>,
 }
 
+/// A part that is made of each scenario.
+struct Part {
+    name: &'static str,
+    title: &'static str,
+    /// Its share of the time, measured in seconds on two cores at full quality.
+    weight: f64,
+    make: fn(&Named, Quality, Watch) -> Made,
+}
+
+const fn part(
+    name: &'static str,
+    title: &'static str,
+    weight: f64,
+    make: fn(&Named, Quality, Watch) -> Made,
+) -> Part {
+    Part {
+        name,
+        title,
+        weight,
+        make,
+    }
+}
+
+/// Of the first scenario only: the readings that are compared include the other preset's.
+const ONCE: [Part; 1] = [part(
+    "sensitivity",
+    "How the edges move",
+    37.0,
+    sensitivity::sensitivity,
+)];
+
+const PARTS: [Part; 10] = [
+    part(
+        "characteristics",
+        "Figures 2, 9 to 11 and 14 to 16: tyres and effective nonlinearities; realisability",
+        0.1,
+        characteristics::characteristics,
+    ),
+    part(
+        "speed",
+        "Figures 6 and 7: sweep over the speed",
+        16.0,
+        sweeps::speed,
+    ),
+    part(
+        "square",
+        "Figure 8: sweep over the square dither's amplitude",
+        8.0,
+        sweeps::square,
+    ),
+    part(
+        "sine",
+        "Figure 13: sweep over the sine dither's amplitude",
+        13.0,
+        sweeps::sine,
+    ),
+    part(
+        "suppression",
+        "Figures 12 and 17: chaos suppressed",
+        0.2,
+        figures::suppression,
+    ),
+    part(
+        "exponents",
+        "All Lyapunov exponents, by three methods",
+        16.5,
+        measures::exponents,
+    ),
+    part("lengths", "How long is long enough", 5.0, measures::lengths),
+    part(
+        "motion",
+        "Poincar\u{e9} section and frequency spectrum",
+        0.5,
+        measures::motion,
+    ),
+    part(
+        "averaging",
+        "Averaging against the true signal",
+        5.5,
+        figures::averaging,
+    ),
+    part("errata", "What the print gets wrong", 2.4, errata::errata),
+];
+
 /// All pieces in the order of the page.
 pub fn all(options: &Options) -> Vec<Piece> {
     let mut pieces = Vec::new();
     for (k, (name, scenario)) in options.scenarios.iter().enumerate() {
-        let named = Named {
-            name: name.clone(),
-            scenario: *scenario,
-        };
-        let mut piece = |part: &str, title: &str, make| {
+        let once = if k == 0 { ONCE.as_slice() } else { &[] };
+        for part in PARTS.iter().chain(once) {
             pieces.push(Piece {
-                name: format!("{part}-{name}"),
-                title: format!("{title} ({name})"),
-                scenario: named.clone(),
-                make,
+                name: format!("{}-{name}", part.name),
+                title: format!("{} ({name})", part.title),
+                weight: part.weight,
+                scenario: Named {
+                    name: name.clone(),
+                    scenario: *scenario,
+                },
+                make: part.make,
             });
-        };
-        piece(
-            "characteristics",
-            "Figures 2, 9 to 11 and 14 to 16: tyres and effective nonlinearities; realisability",
-            characteristics::characteristics,
-        );
-        piece(
-            "speed",
-            "Figures 6 and 7: sweep over the speed",
-            sweeps::speed,
-        );
-        piece(
-            "square",
-            "Figure 8: sweep over the square dither's amplitude",
-            sweeps::square,
-        );
-        piece(
-            "sine",
-            "Figure 13: sweep over the sine dither's amplitude",
-            sweeps::sine,
-        );
-        piece(
-            "suppression",
-            "Figures 12 and 17: chaos suppressed",
-            figures::suppression,
-        );
-        piece(
-            "exponents",
-            "All Lyapunov exponents, by three methods",
-            measures::exponents,
-        );
-        piece(
-            "motion",
-            "Poincar\u{e9} section and frequency spectrum",
-            measures::motion,
-        );
-        piece(
-            "averaging",
-            "Averaging against the true signal",
-            figures::averaging,
-        );
-        // The readings that are compared include the other preset's.
-        if k == 0 {
-            piece(
-                "sensitivity",
-                "How the edges move",
-                sensitivity::sensitivity,
-            );
         }
-        piece("errata", "What the print gets wrong", errata::errata);
     }
     pieces
 }
