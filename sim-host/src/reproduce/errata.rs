@@ -4,12 +4,17 @@ use super::piece::{Material, Named};
 use super::{Made, Quality};
 use crate::chaos::attractor::attractor;
 use crate::chaos::sweep::{SweepError, Timing, Watch};
+use crate::trace::is_bounded;
+use nalgebra::Vector4;
 use shared_model::Scenario;
-use shared_model::dither::Waveform;
-use shared_model::friction::FrictionLaw;
+use shared_model::dither::{Injection, Waveform};
+use shared_model::friction::{FrictionLaw, FrictionMode};
 use shared_model::tire::{HIGH_FRICTION_ROAD, LOW_FRICTION_ROAD, Road};
+use shared_model::vehicle::{Model, SIDESLIP, YAW_RATE};
 
 const GRAVITY_M_PER_S2: f64 = 9.81;
+/// Length of the run with (14)'s first line as printed, s.
+const PRINTED_RUN_S: f64 = 200.0;
 
 /// The experiments.
 pub fn errata(named: &Named, quality: Quality, watch: Watch) -> Made {
@@ -64,6 +69,22 @@ pub fn errata(named: &Named, quality: Quality, watch: Watch) -> Made {
             base.run.wheel_speed_rpm,
             kind(base)?,
             kind(&usual_sign)?
+        ),
+    ));
+
+    let frictionless = changed(&|scenario| scenario.friction.law = FrictionLaw::None);
+    let own = attractor(&frictionless, timing, true)?;
+    (watch.done)();
+    findings.push((
+        "(14) misprints its first line".into(),
+        format!(
+            "(1) and (20) subtract x2 from the lateral term; with (14)'s product of the two, and without friction, the motion at \
+             {} rpm {}; with the difference it is {}, beta from {:.3} to {:.3} rad",
+            base.run.wheel_speed_rpm,
+            printed_lateral(&frictionless)?,
+            own.kind,
+            own.lower[SIDESLIP],
+            own.upper[SIDESLIP]
         ),
     ));
 
@@ -149,6 +170,34 @@ pub fn errata(named: &Named, quality: Quality, watch: Watch) -> Made {
         findings,
         ..Material::default()
     })
+}
+
+/// What becomes of the frictionless motion if the first line of (14) is taken as printed, beta' = (F_f + F_r)/(m v) times gamma
+/// instead of less gamma.
+fn printed_lateral(scenario: &Scenario<f64>) -> Result<String, SweepError> {
+    scenario.validate()?;
+    let model = Model::new(scenario);
+    let slope = |x: &Vector4<f64>| {
+        let mut slope = model.derivative(x, Injection::Off, FrictionMode::Neutral);
+        let lateral = slope[SIDESLIP] + x[YAW_RATE];
+        slope[SIDESLIP] = lateral * x[YAW_RATE];
+        slope
+    };
+    let step_s = scenario.step_s();
+    let mut x = model.initial_state(scenario).x;
+    let steps = (PRINTED_RUN_S / step_s) as u32;
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for step in 1..=steps {
+        // The midpoint rule: how large the motion is does not hang on the last digits.
+        x += slope(&(x + slope(&x) * (0.5 * step_s))) * step_s;
+        if !is_bounded(&x) {
+            return Ok(format!("diverges after {:.1} s", f64::from(step) * step_s));
+        }
+        if step > steps / 2 {
+            (low, high) = (low.min(x[SIDESLIP]), high.max(x[SIDESLIP]));
+        }
+    }
+    Ok(format!("keeps beta from {low:.3} to {high:.3} rad"))
 }
 
 /// Greatest lateral force of a road's tyres over the vehicle's weight.
