@@ -9,7 +9,7 @@ use crate::tasks::{self, ControlInterrupt, PwmInterrupt};
 use crate::{log, stack};
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::SystemHandler;
-use shared_model::controller::Ecu;
+use shared_model::open_loop::OpenLoop;
 use shared_model::telemetry::Header;
 use shared_model::{InvalidScenario, Scenario};
 
@@ -28,7 +28,7 @@ pub fn run() -> ExitCode {
         Ok(command) => command,
         Err(error) => return refuse_command(&error),
     };
-    let ecu = match Ecu::new(&command.scenario) {
+    let ecu = match OpenLoop::new(&command.scenario) {
         Ok(ecu) => ecu,
         Err(error) => return refuse_scenario(&error),
     };
@@ -110,7 +110,7 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
 
 fn record(
     scenario: &Scenario<f32>,
-    ecu: Ecu<f32>,
+    ecu: OpenLoop<f32>,
     telemetry: Option<&str>,
 ) -> Result<ExitCode, HostFileError> {
     let neutral = ecu.pwm.neutral();
@@ -147,7 +147,7 @@ fn record(
 }
 
 fn start(
-    task: shared_model::controller::PwmTask<f32>,
+    task: shared_model::open_loop::PwmTask<f32>,
     control: ControlInterrupt,
     scenario: &Scenario<f32>,
 ) {

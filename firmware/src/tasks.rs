@@ -12,7 +12,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use critical_section::Mutex;
 use embedded_hal::pwm::SetDutyCycle;
-use shared_model::controller::{ControlTask, PwmTask};
+use shared_model::open_loop::{ControlTask, PwmTask};
 use shared_model::telemetry::Record;
 
 /// The dither sample that the PWM holds, as bits.

@@ -5,15 +5,17 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod controller;
 pub mod dither;
+pub mod exchange;
 pub mod friction;
 pub mod integrate;
+pub mod open_loop;
 pub mod parameter;
 pub mod real;
 pub mod scenario;
 pub mod servo;
 pub mod settings;
+pub mod signal;
 pub mod steering;
 pub mod telemetry;
 pub mod tire;

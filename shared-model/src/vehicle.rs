@@ -152,14 +152,14 @@ impl<T: Real> Model<T> {
     /// The model of a scenario, which must be valid.
     pub fn new(scenario: &Scenario<T>) -> Self {
         let (vehicle, steering) = (&scenario.vehicle, &scenario.steering);
-        let speed = vehicle.speed_m_per_s(scenario.run.wheel_speed_rpm);
-        Self {
+        let mut model = Self {
             slip_form: vehicle.slip_form,
             front: Tire::new(scenario.tires.model, &scenario.tires.front),
             rear: Tire::new(scenario.tires.model, &scenario.tires.rear),
-            front_lever_s: vehicle.front_axle_distance_m / speed,
-            rear_lever_s: vehicle.rear_axle_distance_m / speed,
-            lateral_gain: T::one() / (vehicle.mass_kg * speed),
+            // Until the speed is set below.
+            front_lever_s: T::zero(),
+            rear_lever_s: T::zero(),
+            lateral_gain: T::zero(),
             front_yaw_gain: vehicle.front_axle_distance_m / vehicle.yaw_inertia_kg_m2,
             rear_yaw_gain: vehicle.rear_axle_distance_m / vehicle.yaw_inertia_kg_m2,
             motor_torque_nm: steering.motor_torque_nm(),
@@ -169,7 +169,23 @@ impl<T: Real> Model<T> {
             friction: scenario.friction,
             friction_limit_nm: scenario.friction.limit_nm(steering.pneumatic_trail_m),
             dither_frequency_rad_per_s: scenario.dither.frequency_rad_per_s(),
-        }
+        };
+        model.set_wheel_speed_rpm(vehicle, scenario.run.wheel_speed_rpm);
+        model
+    }
+
+    /// Goes on at another wheel speed N, rpm, for a speed that changes slowly: (14) holds it constant and has no term in its
+    /// rate.
+    pub fn set_wheel_speed_rpm(&mut self, vehicle: &Vehicle<T>, wheel_speed_rpm: T) {
+        let speed = vehicle.speed_m_per_s(wheel_speed_rpm);
+        self.front_lever_s = vehicle.front_axle_distance_m / speed;
+        self.rear_lever_s = vehicle.rear_axle_distance_m / speed;
+        self.lateral_gain = T::one() / (vehicle.mass_kg * speed);
+    }
+
+    /// Goes on with another torque of the motor about the steering axis, r_s tau_M, N m.
+    pub fn set_motor_torque_nm(&mut self, motor_torque_nm: T) {
+        self.motor_torque_nm = motor_torque_nm;
     }
 
     /// The same right-hand side in another arithmetic.

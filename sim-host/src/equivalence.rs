@@ -10,7 +10,7 @@ use crate::chaos::lyapunov::Exponent;
 use crate::chaos::period::yaw_rate_maxima;
 use crate::engine::rounding::Rounded;
 use crate::trace::Trace;
-use shared_model::controller::Ecu;
+use shared_model::open_loop::OpenLoop;
 use shared_model::vehicle::{State, YAW_RATE};
 use shared_model::{InvalidScenario, Real, Scenario};
 
@@ -109,7 +109,7 @@ fn nan_max(a: f64, b: f64) -> f64 {
 /// # Errors
 /// If the scenario is not valid.
 pub fn one_step(scenario: &Scenario<f64>, firmware: &Trace) -> Result<OneStep, InvalidScenario> {
-    let mut ecu = Ecu::new(&scenario.map(&Rounded::from_f64))?;
+    let mut ecu = OpenLoop::new(&scenario.map(&Rounded::from_f64))?;
     let sizes = sizes(firmware);
     let mut ratios = Vec::with_capacity(firmware.states.len());
     let mut squares = 0.0;

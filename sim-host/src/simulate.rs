@@ -2,7 +2,7 @@
 
 use crate::motion::Motion;
 use crate::trace::Trace;
-use shared_model::controller::Ecu;
+use shared_model::open_loop::OpenLoop;
 use shared_model::vehicle::State;
 use shared_model::{InvalidScenario, Real, Scenario};
 
@@ -11,7 +11,7 @@ use shared_model::{InvalidScenario, Real, Scenario};
 /// # Errors
 /// If the scenario is not valid.
 pub fn simulate<T: Real>(scenario: &Scenario<T>) -> Result<Trace, InvalidScenario> {
-    Ok(record(&mut Ecu::new(scenario)?, scenario))
+    Ok(record(&mut OpenLoop::new(scenario)?, scenario))
 }
 
 /// The program of a scenario whose dither is on from the start, after a transient of `transient_s`.
@@ -21,10 +21,10 @@ pub fn simulate<T: Real>(scenario: &Scenario<T>) -> Result<Trace, InvalidScenari
 pub fn after_transient<T: Real>(
     scenario: &Scenario<T>,
     transient_s: f64,
-) -> Result<Ecu<T>, InvalidScenario> {
+) -> Result<OpenLoop<T>, InvalidScenario> {
     let mut scenario = *scenario;
     scenario.dither.start_time_s = T::zero();
-    let mut ecu = Ecu::new(&scenario)?;
+    let mut ecu = OpenLoop::new(&scenario)?;
     let steps = (transient_s * scenario.model_rate_hz().to_f64()).round() as u64;
     for _ in 0..steps {
         ecu.step(|_| {});
@@ -33,7 +33,7 @@ pub fn after_transient<T: Real>(
 }
 
 /// Records the motion of a scenario from the program's present state on, for the scenario's length.
-pub fn record<T: Real>(ecu: &mut Ecu<T>, scenario: &Scenario<T>) -> Trace {
+pub fn record<T: Real>(ecu: &mut OpenLoop<T>, scenario: &Scenario<T>) -> Trace {
     let steps = scenario.steps() as usize;
     let samples_per_step = scenario.samples_per_step() as usize;
     let initial = ecu.control.state().map(Real::to_f64);

@@ -12,7 +12,7 @@ use firmware::exit::ExitCode;
 use firmware::recorder::Recorder;
 use firmware::{command_line, fault, stack};
 use shared_model::Scenario;
-use shared_model::controller::Ecu;
+use shared_model::open_loop::OpenLoop;
 use shared_model::telemetry::Header;
 
 #[cortex_m_rt::entry]
@@ -38,7 +38,7 @@ fn main() -> ! {
 /// Brings the PWM off its neutral duty, so that the way back shows in the trailer of `drill.bin`.
 fn drive_pwm() {
     use embedded_hal::pwm::SetDutyCycle;
-    let Ok(ecu) = Ecu::new(&Scenario::reconstruction()) else {
+    let Ok(ecu) = OpenLoop::new(&Scenario::reconstruction()) else {
         return;
     };
     let period = ecu.pwm.neutral().period();

@@ -11,7 +11,7 @@ use crate::engine::dual::Dual;
 use crate::trace::Trace;
 use nalgebra::{SMatrix, SVector, Vector4};
 use shared_model::Scenario;
-use shared_model::controller::Ecu;
+use shared_model::open_loop::OpenLoop;
 use shared_model::vehicle::State;
 
 /// Fewest pieces for a standard error.
@@ -126,7 +126,7 @@ pub fn largest(scenario: &Scenario<f64>, trace: &Trace, from: usize) -> Option<E
 
 /// Logarithm of the tangent vector's length at each state.
 fn tangent_growth(scenario: &Scenario<f64>, trace: &Trace) -> Option<Vec<f64>> {
-    let mut ecu = Ecu::new(&scenario.map(&Dual::<1>::constant)).ok()?;
+    let mut ecu = OpenLoop::new(&scenario.map(&Dual::<1>::constant)).ok()?;
     let mut tangent = Vector4::repeat(0.5);
     let mut logarithm = 0.0;
     let mut growth = Vec::with_capacity(trace.states.len());

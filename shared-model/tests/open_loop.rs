@@ -1,7 +1,7 @@
 //! The ECU's program in f32: its duty sequence, its rates, and when the dither sets in.
 
-use shared_model::controller::Ecu;
 use shared_model::dither::{Application, Injection, Oscillator, Waveform};
+use shared_model::open_loop::OpenLoop;
 use shared_model::servo::{Duty, Pwm};
 use shared_model::vehicle::State;
 use shared_model::{InvalidScenario, Scenario, integrate};
@@ -27,7 +27,7 @@ fn all() -> impl Iterator<Item = Scenario<f32>> {
 
 /// Duties of so many PWM periods, and how many each step took.
 fn duties(scenario: &Scenario<f32>, periods: usize) -> (Vec<Duty>, Vec<usize>) {
-    let mut ecu = Ecu::new(scenario).unwrap();
+    let mut ecu = OpenLoop::new(scenario).unwrap();
     let (mut duties, mut counts) = (Vec::new(), Vec::new());
     while duties.len() < periods {
         let before = duties.len();
@@ -119,7 +119,7 @@ fn square_has_its_frequency() {
 
 /// The states up to the given time, by the integrator alone.
 fn integrated(scenario: &Scenario<f32>, steps: u32) -> Vec<State<f32>> {
-    let ecu = Ecu::new(scenario).unwrap();
+    let ecu = OpenLoop::new(scenario).unwrap();
     let model = shared_model::vehicle::Model::new(scenario);
     let mut state = *ecu.control.state();
     let mut oscillator = Oscillator::new(&scenario.dither, 10e3_f32);
@@ -140,7 +140,7 @@ fn integrated(scenario: &Scenario<f32>, steps: u32) -> Vec<State<f32>> {
 #[test]
 fn model_sees_the_dither_from_its_start() {
     for scenario in all() {
-        let mut ecu = Ecu::new(&scenario).unwrap();
+        let mut ecu = OpenLoop::new(&scenario).unwrap();
         let start = scenario.dither_start_step();
         let expected = match scenario.dither.application {
             Application::Averaged => 20,
@@ -149,7 +149,7 @@ fn model_sees_the_dither_from_its_start() {
         assert_eq!(start, expected, "20 ms");
         let mut silent = scenario;
         silent.dither.amplitude_v = 0.0;
-        let mut without = Ecu::new(&silent).unwrap();
+        let mut without = OpenLoop::new(&silent).unwrap();
         for (k, state) in (1..).zip(integrated(&scenario, 3 * start)) {
             assert_eq!(*ecu.step(|_| {}), state, "step {k}");
             let same = *without.step(|_| {}) == state;
@@ -165,11 +165,11 @@ fn model_sees_the_dither_from_its_start() {
 #[test]
 fn step_equals_the_two_tasks_by_hand() {
     for scenario in all() {
-        let mut whole = Ecu::new(&scenario).unwrap();
-        let Ecu {
+        let mut whole = OpenLoop::new(&scenario).unwrap();
+        let OpenLoop {
             mut pwm,
             mut control,
-        } = Ecu::new(&scenario).unwrap();
+        } = OpenLoop::new(&scenario).unwrap();
         for _ in 0..500 {
             let mut duties = Vec::new();
             let state = *whole.step(|duty| duties.push(duty));
@@ -193,7 +193,7 @@ fn step_equals_the_two_tasks_by_hand() {
 fn dither_may_start_at_once() {
     let mut scenario = scenario(Waveform::Square, Application::Signal);
     scenario.dither.start_time_s = 0.0;
-    let mut ecu = Ecu::new(&scenario).unwrap();
+    let mut ecu = OpenLoop::new(&scenario).unwrap();
     let mut first = None;
     ecu.step(|duty| first = Some(duty.code()));
     assert_eq!(first, Some(1615));
@@ -202,7 +202,7 @@ fn dither_may_start_at_once() {
 /// The duty of the safe state is that of no voltage, whatever the motor's is.
 #[test]
 fn neutral_is_no_voltage() {
-    let ecu = Ecu::new(&scenario(Waveform::Square, Application::Averaged)).unwrap();
+    let ecu = OpenLoop::new(&scenario(Waveform::Square, Application::Averaged)).unwrap();
     assert_eq!(ecu.pwm.neutral().code(), 1250);
 }
 
@@ -210,7 +210,7 @@ fn neutral_is_no_voltage() {
 fn bad_scenario_makes_no_ecu() {
     let mut scenario = scenario(Waveform::Square, Application::Averaged);
     scenario.dither.amplitude_v = 9.5;
-    let error = Ecu::new(&scenario).err();
+    let error = OpenLoop::new(&scenario).err();
     assert!(
         matches!(error, Some(InvalidScenario::OverVoltage { .. })),
         "{error:?}"

@@ -1,7 +1,8 @@
-//! The ECU's program: a PWM task that dithers the servo's voltage, and a control task that steps the vehicle model.
+//! The ECU in open loop: a PWM task that dithers the servo's voltage, and a control task that steps the vehicle model on the
+//! ECU itself, without sensors. The program that firmware and host are compared on.
 //!
 //! The PWM task runs at the PWM rate, in an interrupt. It says when the control task is due: every so many samples, so
-//! that the two rates are locked to each other. Firmware runs the two at different priorities; [`Ecu`] runs them in turn
+//! that the two rates are locked to each other. Firmware runs the two at different priorities; [`OpenLoop`] runs them in turn
 //! on the host. Both give the same bits.
 
 use crate::dither::{Dither, Injection, Oscillator};
@@ -97,22 +98,22 @@ impl<T: Real> ControlTask<T> {
 /// The whole program, its tasks run in turn.
 ///
 /// ```
-/// use shared_model::{Scenario, controller::Ecu};
-/// let mut ecu = Ecu::new(&Scenario::<f32>::reconstruction()).unwrap();
+/// use shared_model::{Scenario, open_loop::OpenLoop};
+/// let mut ecu = OpenLoop::new(&Scenario::<f32>::reconstruction()).unwrap();
 /// let mut duties = 0;
 /// let state = ecu.step(|_duty| duties += 1);
 /// assert_eq!(duties, 10); // 10 kHz PWM, 1 kHz model
 /// assert!(state.x[1] != 0.0);
 /// ```
 #[derive(Debug, Clone)]
-pub struct Ecu<T> {
+pub struct OpenLoop<T> {
     /// The task at the PWM rate.
     pub pwm: PwmTask<T>,
     /// The task at the model's rate.
     pub control: ControlTask<T>,
 }
 
-impl<T: Real> Ecu<T> {
+impl<T: Real> OpenLoop<T> {
     /// The program for a scenario.
     ///
     /// # Errors

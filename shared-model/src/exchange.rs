@@ -1,0 +1,53 @@
+//! What passes the ECU's pins in one PWM period, as fixed-length packets: how a host stands in for servo and sensors.
+//!
+//! At the start of each period the ECU puts out its duty, and at a control tick an actuator frame. The host moves the
+//! vehicle through that period and answers with the duty that was seen on the servo's pin and, at a control tick, a
+//! sensor frame. The frames themselves are opaque here; the module `frame` reads them.
+
+/// Length of a sensor or actuator frame, bytes: a CAN FD payload.
+pub const FRAME_LEN: usize = 24;
+/// Bytes of a sensor or actuator frame.
+pub type FrameBytes = [u8; FRAME_LEN];
+/// Length of either packet, bytes: duty code, "a frame follows", frame (zeros without one).
+pub const PACKET_LEN: usize = 2 + 1 + FRAME_LEN;
+/// Bytes of a packet.
+pub type PacketBytes = [u8; PACKET_LEN];
+
+/// One direction of the exchange in one PWM period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Packet {
+    /// From the ECU: the duty code of the period that begins. To the ECU: the code that was captured at the servo's pin
+    /// during that period.
+    pub duty_code: u16,
+    /// From the ECU an actuator frame, to the ECU a sensor frame; `None` between control ticks, or if it was lost.
+    pub frame: Option<FrameBytes>,
+}
+
+impl Packet {
+    /// The packet's bytes.
+    ///
+    /// ```
+    /// use shared_model::exchange::Packet;
+    /// let packet = Packet { duty_code: 1250, frame: Some([7; 24]) };
+    /// assert_eq!(Packet::decode(&packet.encode()), packet);
+    /// ```
+    pub fn encode(&self) -> PacketBytes {
+        let mut bytes = [0; PACKET_LEN];
+        bytes[..2].copy_from_slice(&self.duty_code.to_le_bytes());
+        if let Some(frame) = &self.frame {
+            bytes[2] = 1;
+            bytes[3..].copy_from_slice(frame);
+        }
+        bytes
+    }
+
+    /// Reads a packet's bytes.
+    pub fn decode(bytes: &PacketBytes) -> Self {
+        let mut frame = [0; FRAME_LEN];
+        frame.copy_from_slice(&bytes[3..]);
+        Self {
+            duty_code: u16::from_le_bytes([bytes[0], bytes[1]]),
+            frame: (bytes[2] != 0).then_some(frame),
+        }
+    }
+}
