@@ -5,14 +5,20 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod controller;
 pub mod dither;
+pub mod e2e;
+pub mod ecu;
 pub mod exchange;
+pub mod frame;
 pub mod friction;
+pub mod gate;
 pub mod integrate;
 pub mod open_loop;
 pub mod parameter;
 pub mod real;
 pub mod scenario;
+pub mod schedule;
 pub mod servo;
 pub mod settings;
 pub mod signal;

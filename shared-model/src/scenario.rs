@@ -1,8 +1,10 @@
 //! A scenario: every parameter of one run, the presets, and the check that they fit together.
 
 use crate::Real;
+use crate::controller::Policy;
 use crate::dither::{Application, Dither, Waveform};
 use crate::friction::{Friction, FrictionLaw};
+use crate::gate::Limits;
 use crate::parameter::{Field, OutOfRange, ParameterSet};
 use crate::servo::Servo;
 use crate::steering::Steering;
@@ -124,6 +126,10 @@ pub struct Scenario<T> {
     pub dither: Dither<T>,
     /// Servo drive.
     pub servo: Servo<T>,
+    /// The controller's dither policy, for an ECU in the loop.
+    pub policy: Policy<T>,
+    /// The command gate's limits, for an ECU in the loop.
+    pub gate: Limits<T>,
     /// Speed, rates, length and start.
     pub run: Run<T>,
 }
@@ -196,6 +202,8 @@ impl<T: Real> Scenario<T> {
                 winding_resistance_ohm: 0.3,
                 timer_clock_hz: 25e6,
             },
+            policy: Policy::reconstruction(),
+            gate: Limits::reconstruction(),
             run: Run {
                 wheel_speed_rpm: 1750.0,
                 duration_s: 20.0,
@@ -233,6 +241,8 @@ impl<T: Real> Scenario<T> {
             friction: self.friction.map(f),
             dither: self.dither.map(f),
             servo: self.servo.map(f),
+            policy: self.policy.map(f),
+            gate: self.gate.map(f),
             run: Run {
                 wheel_speed_rpm: f(run.wheel_speed_rpm),
                 duration_s: f(run.duration_s),
@@ -267,6 +277,8 @@ impl<T: Real> Scenario<T> {
         self.friction.validate()?;
         self.dither.validate()?;
         self.servo.validate()?;
+        self.policy.validate()?;
+        self.gate.validate()?;
         self.run.validate()?;
         self.validate_rates()?;
         self.validate_frequency()?;
@@ -353,6 +365,13 @@ impl<T: Real> Scenario<T> {
     fn steps_until(&self, time_s: T) -> u32 {
         // In f64 whatever T is: f32 has no halves from 2^23 steps on.
         (time_s.to_f64() * self.model_rate_hz().to_f64() + 0.5) as u32
+    }
+
+    /// PWM periods in a control tick.
+    pub fn periods_per_tick(&self) -> u32 {
+        (self.run.pwm_rate_hz / self.run.control_rate_hz + T::from_f64(0.5))
+            .to_u32()
+            .max(1)
     }
 
     /// PWM samples in a model step.

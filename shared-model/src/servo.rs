@@ -118,7 +118,7 @@ impl Duty {
 }
 
 /// The servo's PWM: conversion between volts and duty at one carrier frequency.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pwm<T> {
     period: u16,
     counts_per_volt: T,

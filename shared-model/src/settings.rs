@@ -142,6 +142,8 @@ impl<T: Real + FromStr> Scenario<T> {
             "friction" => changed.friction.set(name, number),
             "dither" => changed.dither.set(name, number),
             "servo" => changed.servo.set(name, number),
+            "policy" => changed.policy.set(name, number),
+            "gate" => changed.gate.set(name, number),
             "run" => changed.run.set(name, number),
             _ => false,
         };

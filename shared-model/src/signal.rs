@@ -69,3 +69,18 @@ pub struct Actuation<T> {
     /// Counter of the last valid sensor frame.
     pub sensor_counter: u8,
 }
+
+impl<T: Real> Actuation<T> {
+    /// The same actuation in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Actuation<U> {
+        Actuation {
+            mode: self.mode,
+            faults: self.faults,
+            motor_voltage_v: f(self.motor_voltage_v),
+            dither_amplitude_v: f(self.dither_amplitude_v),
+            wheel_speed_limit_rpm: f(self.wheel_speed_limit_rpm),
+            warnings: self.warnings,
+            sensor_counter: self.sensor_counter,
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! The controller: the driver's request becomes the motor's share of the servo voltage, the wheel speed the dither's
+//! amplitude. The gate that guards it shares no code with it.
+
+use crate::Real;
+use crate::parameter::{Field, ParameterSet};
+use crate::scenario::Scenario;
+use crate::schedule::Schedule;
+use crate::signal::Measurement;
+
+/// When the dither is on, and how fast commands may move.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Policy<T> {
+    /// Wheel speed below which there is no dither, rpm.
+    pub dither_off_below_rpm: T,
+    /// The dither comes on again this much above that speed, rpm.
+    pub hysteresis_rpm: T,
+    /// Time in which the dither comes in and goes out, s.
+    pub dither_ramp_s: T,
+    /// Greatest motor current that a request gets, A.
+    pub motor_current_a: T,
+    /// Greatest change of the motor current, A/s.
+    pub motor_slew_a_per_s: T,
+}
+
+impl<T: Real> Policy<T> {
+    /// The policy for the preset `reconstruction`.
+    pub fn reconstruction() -> Self {
+        Self {
+            dither_off_below_rpm: T::from_f64(1200.0),
+            hysteresis_rpm: T::from_f64(20.0),
+            dither_ramp_s: T::from_f64(0.5),
+            motor_current_a: T::from_f64(14.0),
+            motor_slew_a_per_s: T::from_f64(10.0),
+        }
+    }
+
+    /// The same policy in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Policy<U> {
+        Policy {
+            dither_off_below_rpm: f(self.dither_off_below_rpm),
+            hysteresis_rpm: f(self.hysteresis_rpm),
+            dither_ramp_s: f(self.dither_ramp_s),
+            motor_current_a: f(self.motor_current_a),
+            motor_slew_a_per_s: f(self.motor_slew_a_per_s),
+        }
+    }
+}
+
+impl<T: Real> ParameterSet<T> for Policy<T> {
+    const SECTION: &'static str = "policy";
+    const FIELDS: &'static [Field<Self, T>] = &[
+        Field {
+            name: "dither_off_below_rpm",
+            min: 0.0,
+            max: 1e5,
+            place: |p| &mut p.dither_off_below_rpm,
+        },
+        Field {
+            name: "hysteresis_rpm",
+            min: 0.0,
+            max: 1e4,
+            place: |p| &mut p.hysteresis_rpm,
+        },
+        Field {
+            name: "dither_ramp_s",
+            min: 1e-3,
+            max: 100.0,
+            place: |p| &mut p.dither_ramp_s,
+        },
+        Field {
+            name: "motor_current_a",
+            min: 0.0,
+            max: 1000.0,
+            place: |p| &mut p.motor_current_a,
+        },
+        Field {
+            name: "motor_slew_a_per_s",
+            min: 1e-3,
+            max: 1e6,
+            place: |p| &mut p.motor_slew_a_per_s,
+        },
+    ];
+}
+
+/// What the controller asks for until the next control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Command<T> {
+    /// Motor's share of the servo voltage, V.
+    pub motor_v: T,
+    /// Amplitude of the dither, V.
+    pub dither_amplitude_v: T,
+}
+
+/// The controller, run once a control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Controller<T> {
+    policy: Policy<T>,
+    schedule: Schedule<T>,
+    winding_resistance_ohm: T,
+    period_s: T,
+    ticks_to_dither: u32,
+    dither_on: bool,
+    /// Share of the scheduled amplitude that is on, 0 to 1.
+    ramp: T,
+    motor_current_a: T,
+}
+
+impl<T: Real> Controller<T> {
+    /// The controller of a scenario, with the schedule of its dither.
+    pub fn new(scenario: &Scenario<T>, schedule: Schedule<T>) -> Self {
+        let rate_hz = scenario.run.control_rate_hz;
+        Self {
+            policy: scenario.policy,
+            schedule,
+            winding_resistance_ohm: scenario.servo.winding_resistance_ohm,
+            period_s: T::one() / rate_hz,
+            ticks_to_dither: (scenario.dither.start_time_s * rate_hz + T::from_f64(0.5)).to_u32(),
+            dither_on: false,
+            ramp: T::zero(),
+            motor_current_a: T::zero(),
+        }
+    }
+
+    /// A control tick with the latest valid measurement.
+    pub fn run(&mut self, measurement: &Measurement<T>) -> Command<T> {
+        let speed_rpm = measurement.wheel_speed_rpm;
+        self.switch_dither(speed_rpm);
+        let step = self.period_s / self.policy.dither_ramp_s;
+        let target = if self.dither_on { T::one() } else { T::zero() };
+        self.ramp = towards(self.ramp, target, step);
+
+        let limit = self.policy.motor_current_a;
+        let request = limited(measurement.current_request_a, limit);
+        let slew = self.policy.motor_slew_a_per_s * self.period_s;
+        self.motor_current_a = towards(self.motor_current_a, request, slew);
+        Command {
+            motor_v: self.motor_current_a * self.winding_resistance_ohm,
+            dither_amplitude_v: self.ramp * self.schedule.amplitude_v(speed_rpm),
+        }
+    }
+
+    fn switch_dither(&mut self, speed_rpm: T) {
+        if self.ticks_to_dither > 0 {
+            self.ticks_to_dither -= 1;
+            return;
+        }
+        let off_below = self.policy.dither_off_below_rpm;
+        if speed_rpm < off_below {
+            self.dither_on = false;
+        } else if speed_rpm >= off_below + self.policy.hysteresis_rpm {
+            self.dither_on = true;
+        }
+    }
+}
+
+/// `value` moved to `target` by at most `step`.
+fn towards<T: Real>(value: T, target: T, step: T) -> T {
+    if target > value + step {
+        value + step
+    } else if target < value - step {
+        value - step
+    } else {
+        target
+    }
+}
+
+/// `value` cut to magnitude `limit`.
+fn limited<T: Real>(value: T, limit: T) -> T {
+    if value > limit {
+        limit
+    } else if value < -limit {
+        -limit
+    } else {
+        value
+    }
+}

@@ -1,0 +1,85 @@
+//! The ECU's program in the loop: sensor frames in, duty codes and actuator frames out.
+//!
+//! The PWM task runs at the PWM rate, in an interrupt, and says when a control tick is due. The control task checks the
+//! sensor frame, runs the controller, and has the gate judge both. What it computes in one control tick acts from the next
+//! one on, however long it took, so that interrupts cannot change a result.
+//!
+//! Both tasks run twice, on two sets of parameters and state in memory ([`duplex`]). Where the two differ, memory was
+//! changed, and the safe state follows. [`Ecu`] runs the tasks in turn on the host; firmware runs them at two priorities.
+//! Both give the same bits.
+
+mod control;
+mod duplex;
+mod pwm;
+
+pub use control::{ControlInput, ControlOutput, ControlTask, Warning};
+pub use pwm::{PwmPeriod, PwmTask};
+
+use crate::exchange::Packet;
+use crate::schedule::Schedule;
+use crate::{InvalidScenario, Real, Scenario};
+
+/// The whole program, its tasks run in turn.
+#[derive(Debug, Clone)]
+pub struct Ecu<T> {
+    /// The task at the PWM rate.
+    pub pwm: PwmTask<T>,
+    /// The task at the control rate.
+    pub control: ControlTask<T>,
+    output: Option<ControlOutput<T>>,
+    input: ControlInput,
+}
+
+impl<T: Real> Ecu<T> {
+    /// The program of a scenario, with the schedule of its dither's amplitude; its independent clock counts `clock_hz` a
+    /// second.
+    ///
+    /// # Errors
+    /// If the scenario is not valid.
+    pub fn new(
+        scenario: &Scenario<T>,
+        schedule: Schedule<T>,
+        clock_hz: u32,
+    ) -> Result<Self, InvalidScenario> {
+        scenario.validate()?;
+        Ok(Self {
+            pwm: PwmTask::new(scenario),
+            control: ControlTask::new(scenario, schedule, clock_hz),
+            output: None,
+            input: ControlInput::default(),
+        })
+    }
+
+    /// One PWM period: `exchange` takes what the ECU puts out at its start and gives what the pins brought by its end.
+    /// `elapsed_counts` is the time since the last control tick by the independent clock, read where one is due. Returns what
+    /// the control task computed, if it ran.
+    pub fn period(
+        &mut self,
+        exchange: impl FnOnce(&Packet) -> Packet,
+        elapsed_counts: impl FnOnce() -> u32,
+    ) -> Option<ControlOutput<T>> {
+        let period = self.pwm.begin();
+        let output = self.output.take_if(|_| period.control_due);
+        let frame = output.as_ref().map(|output| output.frame);
+        if let Some(output) = output {
+            self.pwm.accept(&output);
+        }
+        let reply = exchange(&Packet {
+            duty_code: period.duty.code(),
+            frame,
+        });
+        self.pwm.end(reply.duty_code);
+        self.input.frame = reply.frame.or(self.input.frame);
+        if !period.control_due {
+            return None;
+        }
+        let input = ControlInput {
+            elapsed_counts: elapsed_counts(),
+            found_by_pwm: self.pwm.faults(),
+            ..core::mem::take(&mut self.input)
+        };
+        let output = self.control.run(&input);
+        self.output = Some(output);
+        Some(output)
+    }
+}

@@ -1,0 +1,142 @@
+//! The task at the control rate: frame, controller, gate.
+
+use super::duplex::Duplex;
+use crate::controller::{Command, Controller};
+use crate::e2e::{Receiver, Sender, Status};
+use crate::exchange::FrameBytes;
+use crate::frame::{
+    ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_measurement, encode_actuation,
+};
+use crate::gate::{Fault, Faults, Observation, Setpoint, Supervisor};
+use crate::schedule::Schedule;
+use crate::signal::{Actuation, Measurement};
+use crate::{Real, Scenario};
+
+/// An event that is detected and tolerated. The number is its bit in a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Warning {
+    /// A sensor frame did not come.
+    FrameMissing = 0,
+    /// A sensor frame was damaged, or another frame in its place.
+    FrameDamaged = 1,
+    /// A sensor frame came twice.
+    FrameRepeated = 2,
+    /// A sensor frame came out of sequence.
+    FrameSequence = 3,
+    /// Sensor frames before this one were lost.
+    FramesLost = 4,
+}
+
+/// What a control tick works on.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ControlInput {
+    /// The sensor frame that came since the last tick.
+    pub frame: Option<FrameBytes>,
+    /// Counts of the independent clock since the last tick.
+    pub elapsed_counts: u32,
+    /// What the PWM task has found.
+    pub found_by_pwm: Faults,
+}
+
+/// What a control tick gives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlOutput<T> {
+    /// For the PWM task, one a channel.
+    pub setpoints: [Setpoint<T>; 2],
+    /// The actuator frame.
+    pub frame: FrameBytes,
+    /// What the frame says.
+    pub actuation: Actuation<T>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Channel<T> {
+    receiver: Receiver,
+    measurement: Option<Measurement<T>>,
+    controller: Controller<T>,
+    supervisor: Supervisor<T>,
+}
+
+impl<T: Real> Channel<T> {
+    fn run(&mut self, input: &ControlInput, found_outside: Faults) -> (Setpoint<T>, Actuation<T>) {
+        let status = self.receiver.check(input.frame.as_ref());
+        let new = input.frame.as_ref().filter(|_| status.is_ok());
+        let new =
+            new.map(|frame| decode_measurement(frame).map(&|signal| T::from_f64(signal.into())));
+        self.measurement = new.or(self.measurement);
+        let command = match &self.measurement {
+            Some(measurement) => self.controller.run(measurement),
+            None => Command {
+                motor_v: T::zero(),
+                dither_amplitude_v: T::zero(),
+            },
+        };
+        let setpoint = self.supervisor.run(&Observation {
+            elapsed_counts: input.elapsed_counts,
+            measurement: new,
+            motor_v: command.motor_v,
+            dither_amplitude_v: command.dither_amplitude_v,
+            found_outside,
+        });
+        let actuation = Actuation {
+            mode: self.supervisor.mode(),
+            faults: self.supervisor.faults().bits(),
+            motor_voltage_v: setpoint.motor_v,
+            dither_amplitude_v: setpoint.dither_amplitude_v,
+            wheel_speed_limit_rpm: self.supervisor.wheel_speed_limit_rpm(),
+            warnings: warning(status).map_or(0, |warning| 1 << warning as u16),
+            sensor_counter: self.receiver.counter(),
+        };
+        (setpoint, actuation)
+    }
+}
+
+fn warning(status: Status) -> Option<Warning> {
+    match status {
+        Status::Ok => None,
+        Status::OkSomeLost => Some(Warning::FramesLost),
+        Status::NoNewData => Some(Warning::FrameMissing),
+        Status::Error => Some(Warning::FrameDamaged),
+        Status::Repeated => Some(Warning::FrameRepeated),
+        Status::WrongSequence => Some(Warning::FrameSequence),
+    }
+}
+
+/// The task at the control rate.
+#[derive(Debug, Clone)]
+pub struct ControlTask<T> {
+    channels: Duplex<Channel<T>>,
+    sender: Sender,
+}
+
+impl<T: Real> ControlTask<T> {
+    pub(super) fn new(scenario: &Scenario<T>, schedule: Schedule<T>, clock_hz: u32) -> Self {
+        Self {
+            channels: Duplex::new(Channel {
+                receiver: Receiver::new(SENSOR_DATA_ID, MAX_DELTA_COUNTER),
+                measurement: None,
+                controller: Controller::new(scenario, schedule),
+                supervisor: Supervisor::new(scenario, clock_hz),
+            }),
+            sender: Sender::new(ACTUATOR_DATA_ID),
+        }
+    }
+
+    /// A control tick.
+    pub fn run(&mut self, input: &ControlInput) -> ControlOutput<T> {
+        let mut found_outside = input.found_by_pwm;
+        found_outside.add_if(!self.channels.agrees(), Fault::ChannelsDiffer);
+        let [a, b] = self
+            .channels
+            .run(|channel| channel.run(input, found_outside));
+        ControlOutput {
+            setpoints: [a.0, b.0],
+            frame: encode_actuation(
+                &a.1.map(&|signal: T| signal.to_f64() as f32),
+                &mut self.sender,
+            ),
+            actuation: a.1,
+        }
+    }
+}

@@ -1,0 +1,121 @@
+//! The task at the PWM rate: dither, gate, duty.
+
+use super::control::ControlOutput;
+use super::duplex::Duplex;
+use crate::dither::Oscillator;
+use crate::gate::{Fault, Faults, Limiter, Setpoint};
+use crate::servo::{Duty, Pwm};
+use crate::{Real, Scenario};
+
+/// What the PWM task hands out at the start of a period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PwmPeriod {
+    /// Duty of the period.
+    pub duty: Duty,
+    /// A control tick is due at its end.
+    pub control_due: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Channel<T> {
+    oscillator: Oscillator,
+    limiter: Limiter<T>,
+    pwm: Pwm<T>,
+    setpoint: Setpoint<T>,
+}
+
+impl<T: Real> Channel<T> {
+    fn duty(&mut self) -> Duty {
+        let sample: T = self.oscillator.sample();
+        let dither_v = self.setpoint.dither_amplitude_v * sample;
+        self.pwm.duty(self.limiter.run(&self.setpoint, dither_v))
+    }
+}
+
+/// The task at the PWM rate.
+#[derive(Debug, Clone)]
+pub struct PwmTask<T> {
+    channels: Duplex<Channel<T>>,
+    neutral: Duty,
+    periods_a_tick: u32,
+    periods_to_tick: u32,
+    faults: Faults,
+}
+
+impl<T: Real> PwmTask<T> {
+    /// The task of a valid scenario, the servo neutral.
+    pub(super) fn new(scenario: &Scenario<T>) -> Self {
+        let run = &scenario.run;
+        let pwm = Pwm::new(&scenario.servo, run.pwm_rate_hz);
+        let neutral = pwm.neutral();
+        let periods_a_tick = scenario.periods_per_tick();
+        Self {
+            channels: Duplex::new(Channel {
+                oscillator: Oscillator::new(&scenario.dither, run.pwm_rate_hz),
+                limiter: Limiter::new(scenario, neutral.code()),
+                pwm,
+                setpoint: Setpoint::neutral(),
+            }),
+            neutral,
+            periods_a_tick,
+            periods_to_tick: periods_a_tick,
+            faults: Faults::NONE,
+        }
+    }
+
+    /// Begins a PWM period.
+    pub fn begin(&mut self) -> PwmPeriod {
+        let [a, b] = self.channels.run(Channel::duty);
+        self.faults.add_if(a != b, Fault::ChannelsDiffer);
+        let duty = nearer(self.neutral, a, b);
+        self.channels
+            .run(|channel| channel.limiter.expect(duty.code()));
+
+        self.periods_to_tick = self.periods_to_tick.saturating_sub(1);
+        let control_due = self.periods_to_tick == 0;
+        if control_due {
+            self.periods_to_tick = self.periods_a_tick;
+        }
+        PwmPeriod { duty, control_due }
+    }
+
+    /// Takes over what the control task computed in the last tick; for use where a control tick is due.
+    pub fn accept(&mut self, output: &ControlOutput<T>) {
+        self.channels
+            .run_each(&output.setpoints, |channel, setpoint| {
+                channel.setpoint = *setpoint
+            });
+    }
+
+    /// The control task was not done when due again.
+    pub fn report_late_control(&mut self) {
+        self.faults |= Fault::ControlLate;
+    }
+
+    /// Ends a PWM period with the duty code that the servo's pin showed.
+    pub fn end(&mut self, captured_code: u16) {
+        self.channels
+            .run(|channel| channel.limiter.observe(captured_code));
+    }
+
+    /// Everything found since the start; compares the channels in full.
+    pub fn faults(&mut self) -> Faults {
+        self.faults
+            .add_if(!self.channels.agrees(), Fault::ChannelsDiffer);
+        for found in self.channels.run(|channel| channel.limiter.faults()) {
+            self.faults |= found;
+        }
+        self.faults
+    }
+
+    /// The duty of no voltage.
+    pub fn neutral(&self) -> Duty {
+        self.neutral
+    }
+}
+
+/// Of two duties the one nearer to neutral.
+fn nearer(neutral: Duty, a: Duty, b: Duty) -> Duty {
+    let distance = |duty: Duty| duty.code().abs_diff(neutral.code());
+    if distance(b) < distance(a) { b } else { a }
+}

@@ -1,0 +1,39 @@
+//! The command gate: independent limits on every command, and the safe state. It shares no code with the controller that it
+//! guards.
+//!
+//! At the control rate a [`Supervisor`] judges sensors, time and the controller's command; at the PWM rate a [`Limiter`] judges
+//! each sample of the dither and the duty seen on the servo's pin. Any fault latches the safe state until restart: the dither
+//! is ramped out, the motor's share slews to zero, and the vehicle is asked to slow down.
+
+mod fault;
+mod limiter;
+mod limits;
+mod plausibility;
+mod supervisor;
+
+pub use fault::{Fault, Faults};
+pub use limiter::Limiter;
+pub use limits::Limits;
+pub use plausibility::Plausibility;
+pub use supervisor::{Observation, Supervisor};
+
+use crate::Real;
+
+/// What may be put on the servo until the next control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setpoint<T> {
+    /// Motor's share of the voltage, V.
+    pub motor_v: T,
+    /// Amplitude of the dither, V.
+    pub dither_amplitude_v: T,
+}
+
+impl<T: Real> Setpoint<T> {
+    /// No voltage, no dither.
+    pub fn neutral() -> Self {
+        Self {
+            motor_v: T::zero(),
+            dither_amplitude_v: T::zero(),
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! The gate at the control rate: sensors, time, and the controller's command.
+
+use super::plausibility::Plausibility;
+use super::{Fault, Faults, Limits, Setpoint};
+use crate::Real;
+use crate::dither::Waveform;
+use crate::scenario::Scenario;
+use crate::signal::{Measurement, Mode};
+
+/// Rounding that a command may have above its limit, as a share of it.
+const ROUNDING: f64 = 1e-5;
+
+/// What the gate sees at a control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation<T> {
+    /// Counts of the independent clock since the last control tick.
+    pub elapsed_counts: u32,
+    /// The measurement, if a valid frame brought a new one.
+    pub measurement: Option<Measurement<T>>,
+    /// What the controller asks for: the motor's share of the voltage, V.
+    pub motor_v: T,
+    /// What the controller asks for: the dither's amplitude, V.
+    pub dither_amplitude_v: T,
+    /// Found outside: by the gate at the PWM rate, or by comparing the program's channels.
+    pub found_outside: Faults,
+}
+
+/// The gate at the control rate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Supervisor<T> {
+    limits: Limits<T>,
+    plausibility: Plausibility<T>,
+    amplitude_limit_v: T,
+    /// Greatest change of the motor's share in a control tick, V.
+    slew_v: T,
+    /// What the safe state takes from the amplitude in a control tick, V.
+    ramp_v: T,
+    /// Least and most counts of the clock in a control tick.
+    window_counts: (u32, u32),
+    frame_age_ticks: u32,
+    ticks_since_frame: u32,
+    mode: Mode,
+    faults: Faults,
+    setpoint: Setpoint<T>,
+}
+
+impl<T: Real> Supervisor<T> {
+    /// The gate of a scenario, whose clock counts `clock_hz` a second.
+    pub fn new(scenario: &Scenario<T>, clock_hz: u32) -> Self {
+        let limits = scenario.gate;
+        let period_s = T::one() / scenario.run.control_rate_hz;
+        let speed_per_rpm = scenario.vehicle.speed_m_per_s(T::one());
+        let amplitude_limit_v = match scenario.dither.waveform {
+            Waveform::None => T::zero(),
+            Waveform::Square => limits.square_amplitude_v,
+            Waveform::Sine => limits.sine_amplitude_v,
+        };
+        let counts = T::from_u32(clock_hz) * period_s;
+        let tolerance = limits.tick_tolerance * counts;
+        Self {
+            limits,
+            plausibility: Plausibility::new(&limits, period_s, speed_per_rpm),
+            amplitude_limit_v,
+            slew_v: limits.motor_slew_v_per_s * period_s,
+            ramp_v: amplitude_limit_v * period_s / limits.ramp_out_s,
+            window_counts: ((counts - tolerance).to_u32(), (counts + tolerance).to_u32()),
+            frame_age_ticks: (limits.frame_age_s * scenario.run.control_rate_hz).to_u32(),
+            ticks_since_frame: 0,
+            mode: Mode::Starting,
+            faults: Faults::NONE,
+            setpoint: Setpoint::neutral(),
+        }
+    }
+
+    /// A control tick: judges what was observed, and lets through what is within the limits.
+    pub fn run(&mut self, seen: &Observation<T>) -> Setpoint<T> {
+        let is_first = self.mode == Mode::Starting;
+        self.faults |= seen.found_outside;
+        self.faults |= self.plausibility.check(seen.measurement.as_ref());
+        self.check_frame_age(seen.measurement.is_some());
+        let (least, most) = self.window_counts;
+        let in_time = (least..=most).contains(&seen.elapsed_counts);
+        self.faults.add_if(!is_first && !in_time, Fault::TickWindow);
+        self.check_command(seen);
+
+        if !self.faults.is_empty() {
+            self.mode = Mode::Safe;
+        } else if is_first && seen.measurement.is_some() {
+            self.mode = Mode::Active;
+        }
+        self.setpoint = match self.mode {
+            Mode::Starting => Setpoint::neutral(),
+            Mode::Active => Setpoint {
+                motor_v: seen.motor_v,
+                dither_amplitude_v: seen.dither_amplitude_v,
+            },
+            Mode::Safe => self.towards_neutral(),
+        };
+        self.setpoint
+    }
+
+    fn check_frame_age(&mut self, is_new: bool) {
+        if is_new || self.mode == Mode::Starting {
+            self.ticks_since_frame = 0;
+            return;
+        }
+        self.ticks_since_frame = self.ticks_since_frame.saturating_add(1);
+        let is_old = self.ticks_since_frame > self.frame_age_ticks;
+        self.faults.add_if(is_old, Fault::FrameAge);
+    }
+
+    fn check_command(&mut self, seen: &Observation<T>) {
+        let above = |value: T, limit: T| {
+            // Written so that NaN is above every limit.
+            !(value.abs() <= limit * T::from_f64(1.0 + ROUNDING))
+        };
+        let finite = seen.motor_v.is_finite() && seen.dither_amplitude_v.is_finite();
+        self.faults.add_if(!finite, Fault::CommandNotANumber);
+        self.faults.add_if(
+            above(seen.motor_v, self.limits.motor_voltage_v),
+            Fault::MotorVoltage,
+        );
+        self.faults.add_if(
+            above(seen.motor_v - self.setpoint.motor_v, self.slew_v),
+            Fault::MotorSlew,
+        );
+        let amplitude = seen.dither_amplitude_v;
+        self.faults.add_if(
+            amplitude < T::zero() || above(amplitude, self.amplitude_limit_v),
+            Fault::DitherAmplitude,
+        );
+    }
+
+    fn towards_neutral(&self) -> Setpoint<T> {
+        let motor_v = self.setpoint.motor_v;
+        Setpoint {
+            motor_v: if motor_v > self.slew_v {
+                motor_v - self.slew_v
+            } else if motor_v < -self.slew_v {
+                motor_v + self.slew_v
+            } else {
+                T::zero()
+            },
+            dither_amplitude_v: if self.setpoint.dither_amplitude_v > self.ramp_v {
+                self.setpoint.dither_amplitude_v - self.ramp_v
+            } else {
+                T::zero()
+            },
+        }
+    }
+
+    /// What the ECU is doing.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Everything found since the start.
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+
+    /// Wheel speed that the vehicle must not exceed, rpm.
+    pub fn wheel_speed_limit_rpm(&self) -> T {
+        match self.mode {
+            Mode::Active => self.limits.wheel_speed_rpm,
+            Mode::Starting | Mode::Safe => self.limits.safe_wheel_speed_rpm,
+        }
+    }
+}
