@@ -4,13 +4,14 @@ use crate::board::{Board, Current};
 use crate::command_line::{self, CommandError};
 use crate::exit::ExitCode;
 use crate::host_file::HostFileError;
-use crate::recorder::{self, Recorder};
+use crate::link::Link;
 use crate::tasks::{self, ControlInterrupt, PwmInterrupt};
-use crate::{log, stack};
+use crate::{in_loop, log, open_loop, stack};
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::SystemHandler;
+use shared_model::ecu::Ecu;
 use shared_model::open_loop::OpenLoop;
-use shared_model::telemetry::Header;
+use shared_model::schedule::Schedule;
 use shared_model::{InvalidScenario, Scenario};
 
 /// The watchdog bites when no model step arrives for this many of its periods, or for this long, ms, if that is longer.
@@ -28,23 +29,46 @@ pub fn run() -> ExitCode {
         Ok(command) => command,
         Err(error) => return refuse_command(&error),
     };
-    let ecu = match OpenLoop::new(&command.scenario) {
+    match command.link {
+        Some(link) => steer(&command.scenario, link),
+        None => simulate(&command.scenario, command.telemetry),
+    }
+}
+
+/// The vehicle model runs on the ECU.
+fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>) -> ExitCode {
+    let ecu = match OpenLoop::new(scenario) {
         Ok(ecu) => ecu,
         Err(error) => return refuse_scenario(&error),
     };
     defmt::info!(
         "run of {=f32} s at {=f32} rpm, {=f32} model steps a second",
-        command.scenario.run.duration_s,
-        command.scenario.run.wheel_speed_rpm,
-        command.scenario.model_rate_hz()
+        scenario.run.duration_s,
+        scenario.run.wheel_speed_rpm,
+        scenario.model_rate_hz()
     );
-    match record(&command.scenario, ecu, command.telemetry) {
+    match open_loop::run(scenario, ecu, telemetry) {
         Ok(code) => code,
         Err(HostFileError) => {
             defmt::error!("cannot write the telemetry file");
             ExitCode::TelemetryFailed
         }
     }
+}
+
+/// The ECU steers a vehicle on the other end of the link.
+fn steer(scenario: &Scenario<f32>, link: &str) -> ExitCode {
+    let schedule = Schedule::none();
+    let ecu = match Ecu::new(scenario, schedule, Current::COST_CLOCK_HZ) {
+        Ok(ecu) => ecu,
+        Err(error) => return refuse_scenario(&error),
+    };
+    let Ok(opened) = Link::open(link) else {
+        defmt::error!("cannot open the link {=str}", link);
+        return ExitCode::LinkLost;
+    };
+    defmt::info!("in the loop over the link {=str}", link);
+    in_loop::run(scenario, ecu, opened)
 }
 
 fn refuse_command(error: &CommandError) -> ExitCode {
@@ -108,56 +132,20 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
     ExitCode::BadScenario
 }
 
-fn record(
+/// Starts PWM, interrupts and watchdog; `tasks` says what the two interrupts work on, the control task once every `tick_s`.
+pub fn start(
+    period: u16,
     scenario: &Scenario<f32>,
-    ecu: OpenLoop<f32>,
-    telemetry: Option<&str>,
-) -> Result<ExitCode, HostFileError> {
-    let neutral = ecu.pwm.neutral();
-    let header = Header {
-        samples_per_step: scenario.samples_per_step() as u16,
-        step_rate_hz: (scenario.model_rate_hz() + 0.5) as u32,
-        pwm_period: neutral.period(),
-        cost_clock_hz: Current::COST_CLOCK_HZ,
-        instruction_rate_hz: Current::INSTRUCTION_RATE_HZ,
-        initial: *ecu.control.state(),
-    };
-    let Some((mut recorder, records)) = Recorder::new(telemetry, &header)? else {
-        return Ok(ExitCode::TelemetryFailed);
-    };
-    let control = ControlInterrupt {
-        task: ecu.control,
-        records,
-        steps: scenario.steps(),
-        index: 0,
-    };
-    start(ecu.pwm, control, scenario);
-
-    while !tasks::is_finished() {
-        if recorder.take_one()? {
-            Current::feed_watchdog();
-        } else {
-            Current::idle();
-        }
-    }
-    while recorder.take_one()? {}
-    recorder.flush()?;
-    Current::neutralise_pwm();
-    Ok(conclude())
-}
-
-fn start(
-    task: shared_model::open_loop::PwmTask<f32>,
-    control: ControlInterrupt,
-    scenario: &Scenario<f32>,
+    tick_s: f32,
+    tasks: impl FnOnce(<Current as Board>::Pwm) -> (PwmInterrupt, ControlInterrupt),
 ) {
-    let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * scenario.step_s()) as u32;
+    let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * tick_s) as u32;
     let samples_a_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
     critical_section::with(|_| {
-        let period = task.neutral().period();
         // Started once and with a period that the scenario's check has passed.
         if let Ok(pwm) = Current::start_pwm(period) {
-            tasks::hand_over(PwmInterrupt { task, pwm }, control, samples_a_ms);
+            let (pwm, control) = tasks(pwm);
+            tasks::hand_over(pwm, control, samples_a_ms);
         }
         set_priorities();
         Current::start_watchdog(timeout_ms.max(WATCHDOG_LEAST_MS));
@@ -173,8 +161,8 @@ fn set_priorities() {
     }
 }
 
-fn conclude() -> ExitCode {
-    let overruns = recorder::overruns();
+/// Says how the run ended.
+pub fn conclude(overruns: u32) -> ExitCode {
     let stack_bytes = stack::deepest_bytes();
     if overruns == 0 {
         defmt::info!("run complete; deepest stack {=u32} bytes", stack_bytes);

@@ -8,8 +8,10 @@ use shared_model::settings::SettingError;
 const GET_COMMAND_LINE: usize = 0x15;
 /// Longest command line, bytes.
 const MAX_BYTES: usize = 4096;
-/// Key of the telemetry file's path, the one setting that is not of the scenario.
+/// Key of the telemetry file's path.
 const TELEMETRY: &str = "telemetry=";
+/// Key of the link's name.
+const LINK: &str = "link=";
 
 /// What the command line asks for.
 pub struct Command {
@@ -17,6 +19,8 @@ pub struct Command {
     pub scenario: Scenario<f32>,
     /// Path of the telemetry file on the host, if telemetry is wanted.
     pub telemetry: Option<&'static str>,
+    /// Name of the link to a vehicle, if the ECU is to steer one.
+    pub link: Option<&'static str>,
 }
 
 /// Why the command line was refused.
@@ -49,10 +53,13 @@ fn parse(text: &'static str) -> Result<Command, CommandError> {
     let mut command = Command {
         scenario: Scenario::reconstruction(),
         telemetry: None,
+        link: None,
     };
     for word in text.split_ascii_whitespace().skip(1) {
         if let Some(path) = word.strip_prefix(TELEMETRY) {
             command.telemetry = Some(path);
+        } else if let Some(name) = word.strip_prefix(LINK) {
+            command.link = Some(name);
         } else {
             let applied = command.scenario.apply(word);
             applied.map_err(|error| CommandError::Setting(word, error))?;

@@ -20,6 +20,8 @@ pub enum ExitCode {
     Watchdog = 15,
     /// An interrupt that nobody expects.
     UnexpectedInterrupt = 16,
+    /// The link to the vehicle cannot be opened, or does not answer.
+    LinkLost = 17,
 }
 
 /// SYS_EXIT_EXTENDED, the exit that takes a code along.

@@ -4,6 +4,7 @@
 //! | question | module |
 //! |---|---|
 //! | what runs when? | [`app`] |
+//! | what does it do without and with a vehicle? | [`open_loop`], [`in_loop`] |
 //! | what does a board have to bring? | [`board`] |
 //! | what happens on a fault? | [`fault`] |
 //! | how do records leave the ECU? | [`recorder`] |
@@ -17,7 +18,10 @@ pub mod command_line;
 pub mod exit;
 pub mod fault;
 pub mod host_file;
+pub mod in_loop;
+pub mod link;
 pub mod log;
+pub mod open_loop;
 pub mod recorder;
 pub mod stack;
 pub mod tasks;

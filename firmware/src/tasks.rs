@@ -1,26 +1,23 @@
-//! The control path: the PWM interrupt, and the control task that it makes due.
+//! The two tasks as interrupts, whichever program runs in them.
 //!
 //! SysTick is the PWM interrupt, at high priority. Every so many samples it pends the PendSV exception, at low priority,
 //! which runs the control task. So the two rates are locked, and the PWM interrupt preempts a control task that is still
 //! at work. Nothing here can panic: the binary `panic-free` proves it at link time.
 
 use crate::board::{Board, Current};
-use crate::recorder::{RecordProducer, count_overrun};
+use crate::{in_loop, open_loop};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use critical_section::Mutex;
-use embedded_hal::pwm::SetDutyCycle;
-use shared_model::open_loop::{ControlTask, PwmTask};
-use shared_model::telemetry::Record;
 
-/// The dither sample that the PWM holds, as bits.
-static DITHER_BITS: AtomicU32 = AtomicU32::new(0);
 static CONTROL_DUE: AtomicBool = AtomicBool::new(false);
 static FINISHED: AtomicBool = AtomicBool::new(false);
 /// Most counts that the PWM interrupt took since the last control task.
 static PWM_COST: AtomicU32 = AtomicU32::new(0);
+/// Counts that the PWM interrupt spent on what is not its task.
+static FOREIGN_COST: AtomicU32 = AtomicU32::new(0);
 static SAMPLES: AtomicU32 = AtomicU32::new(0);
 static SAMPLES_A_MS: AtomicU32 = AtomicU32::new(1);
 
@@ -28,23 +25,19 @@ static PWM_START: Mutex<Cell<Option<PwmInterrupt>>> = Mutex::new(Cell::new(None)
 static CONTROL_START: Mutex<Cell<Option<ControlInterrupt>>> = Mutex::new(Cell::new(None));
 
 /// What the PWM interrupt works on.
-pub struct PwmInterrupt {
-    /// The program.
-    pub task: PwmTask<f32>,
-    /// The servo's PWM.
-    pub pwm: <Current as Board>::Pwm,
+pub enum PwmInterrupt {
+    /// The vehicle model runs on the ECU.
+    OpenLoop(open_loop::PwmInterrupt),
+    /// The ECU steers a vehicle.
+    InLoop(in_loop::PwmInterrupt),
 }
 
 /// What the control interrupt works on.
-pub struct ControlInterrupt {
-    /// The program.
-    pub task: ControlTask<f32>,
-    /// Where its records go.
-    pub records: RecordProducer,
-    /// Model steps of the run.
-    pub steps: u32,
-    /// Model steps done.
-    pub index: u32,
+pub enum ControlInterrupt {
+    /// The vehicle model runs on the ECU.
+    OpenLoop(open_loop::ControlInterrupt),
+    /// The ECU steers a vehicle.
+    InLoop(in_loop::ControlInterrupt),
 }
 
 /// Hands the tasks to their interrupts, which take them at their first call.
@@ -56,7 +49,20 @@ pub fn hand_over(pwm: PwmInterrupt, control: ControlInterrupt, samples_a_ms: u32
     });
 }
 
-/// The run's last step is done.
+/// Makes the control task due; false if it has not been done since it was last due.
+pub fn call_control() -> bool {
+    let was_done = !CONTROL_DUE.swap(true, Ordering::Relaxed);
+    SCB::set_pendsv();
+    was_done
+}
+
+/// The run is over: no PWM interrupt comes any more.
+pub fn finish() {
+    Current::stop_pwm_interrupt();
+    FINISHED.store(true, Ordering::Release);
+}
+
+/// The run is over.
 pub fn is_finished() -> bool {
     FINISHED.load(Ordering::Acquire)
 }
@@ -66,48 +72,22 @@ pub fn elapsed_ms() -> u32 {
     SAMPLES.load(Ordering::Relaxed) / SAMPLES_A_MS.load(Ordering::Relaxed).max(1)
 }
 
-impl PwmInterrupt {
-    fn run(&mut self) {
-        let sample = self.task.run();
-        // The PWM's period is the duty's, so the code fits; a PWM that refuses it keeps the last one.
-        if self.pwm.set_duty_cycle(sample.duty.code()).is_err() {
-            count_overrun();
-        }
-        SAMPLES.fetch_add(1, Ordering::Relaxed);
-        DITHER_BITS.store(sample.dither.to_bits(), Ordering::Relaxed);
-        if sample.control_due {
-            if CONTROL_DUE.swap(true, Ordering::Relaxed) {
-                count_overrun();
-            }
-            SCB::set_pendsv();
-        }
-    }
+/// Most counts of the cost clock that the PWM interrupt took since this was last asked.
+pub fn take_pwm_cost() -> u16 {
+    saturate(PWM_COST.swap(0, Ordering::Relaxed))
 }
 
-impl ControlInterrupt {
-    fn run(&mut self) {
-        if self.index == self.steps {
-            return;
-        }
-        let start = Current::cost_counter();
-        let dither = f32::from_bits(DITHER_BITS.load(Ordering::Relaxed));
-        let state = *self.task.run(dither);
-        let cost = Current::cost_counter().wrapping_sub(start);
-        self.index += 1;
-        self.records.push(Record {
-            index: self.index,
-            state,
-            control_cost: saturate(cost),
-            pwm_cost: saturate(PWM_COST.swap(0, Ordering::Relaxed)),
-        });
-        if self.index == self.steps {
-            Current::stop_pwm_interrupt();
-            FINISHED.store(true, Ordering::Release);
-        }
-    }
+/// Leaves the counts that `f` takes out of the PWM interrupt's cost.
+pub fn uncounted<O>(f: impl FnOnce() -> O) -> O {
+    let start = Current::cost_counter();
+    let output = f();
+    let cost = Current::cost_counter().wrapping_sub(start);
+    FOREIGN_COST.fetch_add(cost, Ordering::Relaxed);
+    output
 }
 
-fn saturate(counts: u32) -> u16 {
+/// Counts as a record has them.
+pub fn saturate(counts: u32) -> u16 {
     counts.min(u16::MAX.into()) as u16
 }
 
@@ -118,11 +98,15 @@ fn SysTick() {
     if INTERRUPT.is_none() {
         *INTERRUPT = critical_section::with(|cs| PWM_START.borrow(cs).take());
     }
-    if let Some(interrupt) = INTERRUPT {
-        interrupt.run();
+    SAMPLES.fetch_add(1, Ordering::Relaxed);
+    match INTERRUPT {
+        Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
+        Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),
+        None => {}
     }
     let cost = Current::cost_counter().wrapping_sub(start);
-    PWM_COST.fetch_max(cost, Ordering::Relaxed);
+    let foreign = FOREIGN_COST.swap(0, Ordering::Relaxed);
+    PWM_COST.fetch_max(cost.wrapping_sub(foreign), Ordering::Relaxed);
 }
 
 #[exception]
@@ -131,8 +115,10 @@ fn PendSV() {
     if INTERRUPT.is_none() {
         *INTERRUPT = critical_section::with(|cs| CONTROL_START.borrow(cs).take());
     }
-    if let Some(interrupt) = INTERRUPT {
-        interrupt.run();
+    match INTERRUPT {
+        Some(ControlInterrupt::OpenLoop(interrupt)) => interrupt.run(),
+        Some(ControlInterrupt::InLoop(interrupt)) => interrupt.run(),
+        None => {}
     }
     CONTROL_DUE.store(false, Ordering::Relaxed);
 }

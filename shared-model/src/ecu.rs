@@ -15,7 +15,7 @@ mod pwm;
 pub use control::{ControlInput, ControlOutput, ControlTask, Warning};
 pub use pwm::{PwmPeriod, PwmTask};
 
-use crate::exchange::Packet;
+use crate::exchange::{FrameBytes, Packet};
 use crate::schedule::Schedule;
 use crate::{InvalidScenario, Real, Scenario};
 
@@ -27,7 +27,8 @@ pub struct Ecu<T> {
     /// The task at the control rate.
     pub control: ControlTask<T>,
     output: Option<ControlOutput<T>>,
-    input: ControlInput,
+    /// The sensor frame that came since the last control tick.
+    frame: Option<FrameBytes>,
 }
 
 impl<T: Real> Ecu<T> {
@@ -46,7 +47,7 @@ impl<T: Real> Ecu<T> {
             pwm: PwmTask::new(scenario),
             control: ControlTask::new(scenario, schedule, clock_hz),
             output: None,
-            input: ControlInput::default(),
+            frame: None,
         })
     }
 
@@ -69,14 +70,14 @@ impl<T: Real> Ecu<T> {
             frame,
         });
         self.pwm.end(reply.duty_code);
-        self.input.frame = reply.frame.or(self.input.frame);
+        self.frame = reply.frame.or(self.frame);
         if !period.control_due {
             return None;
         }
         let input = ControlInput {
+            frame: self.frame.take(),
             elapsed_counts: elapsed_counts(),
             found_by_pwm: self.pwm.faults(),
-            ..core::mem::take(&mut self.input)
         };
         let output = self.control.run(&input);
         self.output = Some(output);

@@ -13,6 +13,11 @@ pub const PACKET_LEN: usize = 2 + 1 + FRAME_LEN;
 /// Bytes of a packet.
 pub type PacketBytes = [u8; PACKET_LEN];
 
+/// Length of what the ECU sends, bytes: packet, cost of the PWM task, cost of the control task.
+pub const TO_HOST_LEN: usize = PACKET_LEN + 2 + 2;
+/// Length of what the ECU receives, bytes: packet, "the run is over".
+pub const TO_ECU_LEN: usize = PACKET_LEN + 1;
+
 /// One direction of the exchange in one PWM period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packet {
@@ -48,6 +53,70 @@ impl Packet {
         Self {
             duty_code: u16::from_le_bytes([bytes[0], bytes[1]]),
             frame: (bytes[2] != 0).then_some(frame),
+        }
+    }
+}
+
+/// What the ECU sends in a PWM period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ToHost {
+    /// Duty and actuator frame.
+    pub packet: Packet,
+    /// Most counts of the cost clock that the PWM task took in a period since the last control tick, without the exchange.
+    pub pwm_cost: u16,
+    /// Counts of the cost clock that the last control task took.
+    pub control_cost: u16,
+}
+
+impl ToHost {
+    /// Its bytes.
+    pub fn encode(&self) -> [u8; TO_HOST_LEN] {
+        let mut bytes = [0; TO_HOST_LEN];
+        bytes[..PACKET_LEN].copy_from_slice(&self.packet.encode());
+        let [a, b] = self.pwm_cost.to_le_bytes();
+        let [c, d] = self.control_cost.to_le_bytes();
+        bytes[PACKET_LEN..].copy_from_slice(&[a, b, c, d]);
+        bytes
+    }
+
+    /// Reads its bytes.
+    pub fn decode(bytes: &[u8; TO_HOST_LEN]) -> Self {
+        let mut packet = [0; PACKET_LEN];
+        packet.copy_from_slice(&bytes[..PACKET_LEN]);
+        let number = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        Self {
+            packet: Packet::decode(&packet),
+            pwm_cost: number(PACKET_LEN),
+            control_cost: number(PACKET_LEN + 2),
+        }
+    }
+}
+
+/// What the ECU receives in a PWM period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ToEcu {
+    /// Captured duty and sensor frame.
+    pub packet: Packet,
+    /// The run is over.
+    pub stop: bool,
+}
+
+impl ToEcu {
+    /// Its bytes.
+    pub fn encode(&self) -> [u8; TO_ECU_LEN] {
+        let mut bytes = [0; TO_ECU_LEN];
+        bytes[..PACKET_LEN].copy_from_slice(&self.packet.encode());
+        bytes[PACKET_LEN] = self.stop.into();
+        bytes
+    }
+
+    /// Reads its bytes.
+    pub fn decode(bytes: &[u8; TO_ECU_LEN]) -> Self {
+        let mut packet = [0; PACKET_LEN];
+        packet.copy_from_slice(&bytes[..PACKET_LEN]);
+        Self {
+            packet: Packet::decode(&packet),
+            stop: bytes[PACKET_LEN] != 0,
         }
     }
 }

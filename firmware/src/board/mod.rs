@@ -41,6 +41,22 @@ pub trait Board {
 
     /// Feeds the watchdog.
     fn feed_watchdog();
+
+    /// Opens the UART that links a host.
+    fn open_uart();
+
+    /// Sends a byte on it, waiting for room.
+    fn uart_send(byte: u8);
+
+    /// The next byte from it, if there is one.
+    fn uart_receive() -> Option<u8>;
+
+    /// Stops the counter of [`cost_counter`](Self::cost_counter), the watchdog and the PWM interrupt, so that an emulated ECU
+    /// can wait for its host without ageing.
+    fn pause_time();
+
+    /// Goes on after [`pause_time`](Self::pause_time), the PWM interrupt with a whole period.
+    fn resume_time();
 }
 
 /// Why a board cannot start its PWM.

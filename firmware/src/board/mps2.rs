@@ -1,7 +1,7 @@
 //! Arm MPS2 with the AN386 (Cortex-M4F) or AN500 (Cortex-M7) image, as QEMU emulates them.
 //!
 //! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of RAM and records every code
-//! in a ring.
+//! in a ring, if there is one.
 
 use super::{Board, BoardError};
 use crate::recorder;
@@ -31,6 +31,19 @@ const WATCHDOG_UNLOCK_KEY: u32 = 0x1ACC_E551;
 /// Raises the non-maskable interrupt at the first expiry, without a reset at the second.
 const WATCHDOG_INTERRUPT: u32 = 1;
 
+/// Enable bit of SysTick's control register.
+const SYSTICK_ENABLE: u32 = 1;
+/// CMSDK UART 1: data, state, control and baud-rate registers. UART 0 is the console.
+const UART1_DATA: *mut u32 = 0x4000_5000 as *mut u32;
+const UART1_STATE: *mut u32 = 0x4000_5004 as *mut u32;
+const UART1_CTRL: *mut u32 = 0x4000_5008 as *mut u32;
+const UART1_BAUDDIV: *mut u32 = 0x4000_5010 as *mut u32;
+const UART_TX_FULL: u32 = 1;
+const UART_RX_FULL: u32 = 2;
+const UART_TX_AND_RX: u32 = 3;
+/// The least that the UART takes: 1.56 Mbit/s at 25 MHz.
+const UART_LEAST_DIVIDER: u32 = 16;
+
 static DUTY: AtomicU16 = AtomicU16::new(0);
 static PERIOD: AtomicU16 = AtomicU16::new(0);
 
@@ -40,7 +53,7 @@ pub struct Mps2;
 /// The virtual PWM.
 pub struct VirtualPwm {
     period: u16,
-    recording: recorder::DutyRecording,
+    recording: Option<recorder::DutyRecording>,
 }
 
 impl ErrorType for VirtualPwm {
@@ -55,7 +68,9 @@ impl SetDutyCycle for VirtualPwm {
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
         let duty = duty.min(self.period);
         DUTY.store(duty, Ordering::Relaxed);
-        self.recording.push(duty);
+        if let Some(recording) = &mut self.recording {
+            recording.push(duty);
+        }
         Ok(())
     }
 }
@@ -67,7 +82,7 @@ impl Board for Mps2 {
     const INSTRUCTION_RATE_HZ: u32 = INSTRUCTION_RATE_HZ;
 
     fn start_pwm(period: u16) -> Result<VirtualPwm, BoardError> {
-        let recording = recorder::take_duty_recording().ok_or(BoardError)?;
+        let recording = recorder::take_duty_recording();
         let mut core = cortex_m::Peripherals::take().ok_or(BoardError)?;
         PERIOD.store(period, Ordering::Relaxed);
         Self::neutralise_pwm();
@@ -128,5 +143,48 @@ impl Board for Mps2 {
     fn feed_watchdog() {
         // SAFETY: a write to the watchdog's clear register, which reloads its counter.
         unsafe { write_volatile(WATCHDOG_INTCLR, 1) };
+    }
+
+    fn open_uart() {
+        // SAFETY: writes to registers of the UART, which nothing else uses.
+        unsafe {
+            write_volatile(UART1_BAUDDIV, UART_LEAST_DIVIDER);
+            write_volatile(UART1_CTRL, UART_TX_AND_RX);
+        }
+    }
+
+    fn uart_send(byte: u8) {
+        // SAFETY: a read of the UART's state and a write of its data register.
+        unsafe {
+            while read_volatile(UART1_STATE) & UART_TX_FULL != 0 {}
+            write_volatile(UART1_DATA, byte.into());
+        }
+    }
+
+    fn uart_receive() -> Option<u8> {
+        // SAFETY: reads of the UART's state and data registers; the latter takes the byte out.
+        unsafe {
+            let is_full = read_volatile(UART1_STATE) & UART_RX_FULL != 0;
+            is_full.then(|| read_volatile(UART1_DATA) as u8)
+        }
+    }
+
+    fn pause_time() {
+        // SAFETY: writes to control registers of timer, watchdog and SysTick, which only this module uses.
+        unsafe {
+            write_volatile(TIMER0_CTRL, 0);
+            write_volatile(WATCHDOG_CTRL, 0);
+            (*SYST::PTR).csr.modify(|bits| bits & !SYSTICK_ENABLE);
+        }
+    }
+
+    fn resume_time() {
+        // SAFETY: as above.
+        unsafe {
+            write_volatile(TIMER0_CTRL, 1);
+            write_volatile(WATCHDOG_CTRL, WATCHDOG_INTERRUPT);
+            (*SYST::PTR).cvr.write(0);
+            (*SYST::PTR).csr.modify(|bits| bits | SYSTICK_ENABLE);
+        }
     }
 }

@@ -29,7 +29,7 @@ pub enum Warning {
 }
 
 /// What a control tick works on.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlInput {
     /// The sensor frame that came since the last tick.
     pub frame: Option<FrameBytes>,
@@ -37,6 +37,15 @@ pub struct ControlInput {
     pub elapsed_counts: u32,
     /// What the PWM task has found.
     pub found_by_pwm: Faults,
+}
+
+impl ControlInput {
+    /// No frame, no time, nothing found.
+    pub const NOTHING: Self = Self {
+        frame: None,
+        elapsed_counts: 0,
+        found_by_pwm: Faults::NONE,
+    };
 }
 
 /// What a control tick gives.
