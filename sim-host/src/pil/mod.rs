@@ -3,5 +3,6 @@
 pub mod elf;
 pub mod log;
 pub mod qemu;
+pub mod session;
 pub mod settings;
 pub mod telemetry;

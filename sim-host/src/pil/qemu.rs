@@ -77,6 +77,17 @@ pub enum RunError {
         /// What it said.
         message: String,
     },
+    /// The firmware ended, or closed its link, in the middle of a run.
+    #[error(
+        "the firmware left the loop{}; its last log line: {last_line}",
+        exit_code.map(|code| format!(" with exit code {code} ({})", meaning(code))).unwrap_or_default()
+    )]
+    LinkLost {
+        /// Its exit code, if it gave one.
+        exit_code: Option<i32>,
+        /// What it said last.
+        last_line: String,
+    },
     /// The log's symbols cannot be read.
     #[error("cannot decode the firmware's log: {0:#}")]
     Log(anyhow::Error),
@@ -105,12 +116,13 @@ pub fn meaning(exit_code: i32) -> &'static str {
         14 => "hard fault; the PWM was put to neutral",
         15 => "the watchdog bit; the PWM was put to neutral",
         16 => "unexpected interrupt; the PWM was put to neutral",
+        17 => "the link to the vehicle is lost; the PWM was put to neutral",
         _ => "unknown exit code",
     }
 }
 
 /// A running emulator, ended when dropped.
-struct Emulator(Child);
+pub(super) struct Emulator(pub(super) Child);
 
 impl Drop for Emulator {
     fn drop(&mut self) {
@@ -134,7 +146,8 @@ pub fn run(
     on_line: impl Fn(&str) + Sync,
 ) -> Result<Finished, RunError> {
     let decoder = LogDecoder::new(image).map_err(RunError::Log)?;
-    let mut emulator = start(image, machine, settings, directory)?;
+    let silent = ["-serial".into(), "none".into()];
+    let mut emulator = start(image, machine, settings, directory, &silent)?;
     let console = emulator.0.stdout.take().expect("stdout is piped");
     let errors = emulator.0.stderr.take().expect("stderr is piped");
     thread::scope(|scope| {
@@ -156,11 +169,13 @@ pub fn run(
     })
 }
 
-fn start(
+/// Starts the emulator with `more` arguments.
+pub(super) fn start(
     image: &Image,
     machine: Machine,
     settings: &[String],
     directory: &Path,
+    more: &[String],
 ) -> Result<Emulator, RunError> {
     let mut semihosting = String::from("enable=on,target=native,arg=firmware");
     for setting in settings {
@@ -171,7 +186,8 @@ fn start(
     let mut command = Command::new(PROGRAM);
     command
         .args(["-machine", machine.name(), "-display", "none"])
-        .args(["-monitor", "none", "-serial", "none"])
+        .args(["-monitor", "none"])
+        .args(more)
         .args(["-icount", INSTRUCTION_COUNTING])
         .args(["-semihosting-config", &semihosting])
         .arg("-kernel")
@@ -205,7 +221,7 @@ fn end_with_parent(command: &mut Command) {
 fn end_with_parent(_command: &mut Command) {}
 
 /// `None` if the time is over.
-fn wait(child: &mut Child, limit: Duration) -> Result<Option<ExitStatus>, RunError> {
+pub(super) fn wait(child: &mut Child, limit: Duration) -> Result<Option<ExitStatus>, RunError> {
     let start = Instant::now();
     while start.elapsed() < limit {
         if INTERRUPTED.load(Ordering::Relaxed) {
