@@ -58,7 +58,7 @@ fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>) -> ExitCode {
 
 /// The ECU steers a vehicle on the other end of the link.
 fn steer(scenario: &Scenario<f32>, link: &str) -> ExitCode {
-    let schedule = Schedule::none();
+    let schedule = Schedule::constant(0.1);
     let ecu = match Ecu::new(scenario, schedule, Current::COST_CLOCK_HZ) {
         Ok(ecu) => ecu,
         Err(error) => return refuse_scenario(&error),

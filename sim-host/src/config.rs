@@ -80,7 +80,17 @@ pub fn preset(name: &str) -> Result<Preset, ConfigError> {
 /// # Errors
 /// If the file cannot be read, has a key that no parameter has, or a value of the wrong kind.
 pub fn load(file: Option<&Path>, preset_name: Option<&str>) -> Result<Scenario<f64>, ConfigError> {
-    let mut over = file.map_or_else(|| Ok(Table::new()), read)?;
+    over_preset(file.map_or_else(|| Ok(Table::new()), read)?, preset_name)
+}
+
+/// As [`load`], from a file that is read already.
+///
+/// # Errors
+/// If it has a key that no parameter has, or a value of the wrong kind.
+pub fn over_preset(
+    mut over: Table,
+    preset_name: Option<&str>,
+) -> Result<Scenario<f64>, ConfigError> {
     let in_file = over.remove(PRESET);
     let base = match (preset_name, &in_file) {
         (Some(name), _) => preset(name)?,
@@ -133,7 +143,11 @@ fn table_of(scenario: &Scenario<f64>) -> Table {
     Table::try_from(scenario).expect("a scenario is plain tables and values")
 }
 
-fn read(path: &Path) -> Result<Table, ConfigError> {
+/// A TOML file, unchecked.
+///
+/// # Errors
+/// If it cannot be read, or is no TOML.
+pub fn read(path: &Path) -> Result<Table, ConfigError> {
     let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable {
         path: path.to_path_buf(),
         source,

@@ -10,6 +10,7 @@
 //! | is a motion chaotic, or which period has it? | [`chaos`] |
 //! | where does averaging the dither start to hold? | [`averaging`] |
 //! | how good is the fixed step? | [`convergence`], [`engine::reference`] |
+//! | how does the vehicle move under the ECU's duty, and what do its sensors tell? | [`closed_loop`] |
 //! | how is the firmware run? | [`pil`] |
 //! | do firmware and host agree? | [`equivalence`] |
 //! | what does a whole verification do? | [`verify`] |
@@ -19,6 +20,7 @@
 pub mod averaging;
 pub mod chaos;
 pub mod characteristics;
+pub mod closed_loop;
 pub mod component;
 pub mod config;
 pub mod convergence;

@@ -1,0 +1,96 @@
+//! A drive: the vehicle on its manoeuvre, answering an ECU once a PWM period.
+
+use super::manoeuvre::Manoeuvre;
+use super::plant::{InvalidPlant, Plant};
+use super::record::Record;
+use super::sensor::Sensors;
+use shared_model::Scenario;
+use shared_model::e2e::{Receiver, Sender};
+use shared_model::exchange::{FrameBytes, Packet};
+use shared_model::frame::{
+    ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_actuation, encode_measurement,
+};
+use shared_model::servo::Duty;
+use shared_model::signal::{Actuation, Measurement};
+
+/// The vehicle's end of the exchange.
+#[derive(Debug, Clone)]
+pub struct Drive {
+    plant: Plant,
+    sensors: Sensors,
+    sender: Sender,
+    receiver: Receiver,
+    period_counts: u16,
+    periods_a_tick: u32,
+    periods: u32,
+    actuation: Option<Actuation<f32>>,
+}
+
+impl Drive {
+    /// At the start of a manoeuvre.
+    ///
+    /// # Errors
+    /// If scenario or manoeuvre are not valid.
+    pub fn new(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Result<Self, InvalidPlant> {
+        let plant = Plant::new(scenario, manoeuvre)?;
+        Ok(Self {
+            period_counts: plant.pwm().neutral().period(),
+            plant,
+            sensors: Sensors::new(&manoeuvre.sensors),
+            sender: Sender::new(SENSOR_DATA_ID),
+            receiver: Receiver::new(ACTUATOR_DATA_ID, MAX_DELTA_COUNTER),
+            periods_a_tick: scenario.periods_per_tick(),
+            periods: 0,
+            actuation: None,
+        })
+    }
+
+    /// Takes what the ECU put out for a period, moves through it, and answers with the duty on the servo's pin and, where a
+    /// control tick is due, a sensor frame.
+    pub fn answer(&mut self, from_ecu: &Packet) -> Packet {
+        if let Some(frame) = &from_ecu.frame {
+            self.take(frame);
+        }
+        // The servo's driver has no more counts than its period.
+        let code = from_ecu.duty_code.min(self.period_counts);
+        let duty = Duty::new(code, self.period_counts).expect("cut to the period above");
+        self.plant.step(duty);
+        self.periods += 1;
+        let is_tick = self.periods.is_multiple_of(self.periods_a_tick);
+        Packet {
+            duty_code: code,
+            frame: is_tick.then(|| self.sensor_frame()),
+        }
+    }
+
+    fn take(&mut self, frame: &FrameBytes) {
+        if !self.receiver.check(Some(frame)).is_ok() {
+            return;
+        }
+        if let Ok(actuation) = decode_actuation(frame) {
+            let limit_rpm = f64::from(actuation.wheel_speed_limit_rpm);
+            self.plant.set_wheel_speed_limit_rpm(limit_rpm);
+            self.actuation = Some(actuation);
+        }
+    }
+
+    fn sensor_frame(&mut self) -> FrameBytes {
+        let measurement: Measurement<f32> = self.sensors.sample(&self.plant.truth());
+        encode_measurement(&measurement, &mut self.sender)
+    }
+
+    /// What the ECU last told.
+    pub fn actuation(&self) -> Option<&Actuation<f32>> {
+        self.actuation.as_ref()
+    }
+
+    /// The vehicle.
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// The present moment, for recording.
+    pub fn record(&self) -> Record {
+        self.plant.record()
+    }
+}

@@ -1,0 +1,19 @@
+//! The vehicle's half of the closed loop: the ECU puts out a duty each PWM period, the plant moves, and the sensors tell the
+//! ECU of it once a control tick.
+//!
+//! | question | module |
+//! |---|---|
+//! | how does the vehicle move under a duty? | [`plant`] |
+//! | what of the servo's voltage is torque, and what dither? | [`servo_filter`] |
+//! | what do the sensors tell? | [`sensor`] |
+//! | what do driver and road do, as a file? | [`manoeuvre`], [`profile`] |
+//! | what is recorded? | [`record`] |
+
+pub mod drive;
+pub mod ecu;
+pub mod manoeuvre;
+pub mod plant;
+pub mod profile;
+pub mod record;
+pub mod sensor;
+pub mod servo_filter;

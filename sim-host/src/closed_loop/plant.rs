@@ -1,0 +1,202 @@
+//! The plant: servo, steering and vehicle under the duty that the ECU puts out.
+
+use super::manoeuvre::{InvalidManoeuvre, Manoeuvre, SPEED_RANGE_RPM};
+use super::record::Record;
+use super::servo_filter::{Parts, Separation};
+use shared_model::dither::{Dither, Injection};
+use shared_model::parameter::OutOfRange;
+use shared_model::servo::{Duty, Pwm};
+use shared_model::signal::Measurement;
+use shared_model::steering::Steering;
+use shared_model::vehicle::{Model, SIDESLIP, STEERING_ANGLE, STEERING_RATE, State, YAW_RATE};
+use shared_model::{InvalidScenario, Scenario, integrate};
+
+/// Least resistance of the winding, ohm, at which a voltage still says something of the current.
+const MIN_RESISTANCE_OHM: f64 = 1e-3;
+
+/// Why there is no plant.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum InvalidPlant {
+    /// The scenario cannot be run.
+    #[error(transparent)]
+    Scenario(#[from] InvalidScenario),
+    /// The manoeuvre cannot be driven.
+    #[error(transparent)]
+    Manoeuvre(#[from] InvalidManoeuvre),
+}
+
+/// The vehicle on its manoeuvre, in f64, stepped at the PWM rate.
+///
+/// The servo sees the mean voltage of each period, not the carrier's ripple. The slow part of it drives the motor current
+/// through the winding's resistance (back-EMF and inductance are left out, as in the paper's constant current); the rest is
+/// the dither, which enters ahead of the nonlinearities and is held over the period.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    scenario: Scenario<f64>,
+    manoeuvre: Manoeuvre,
+    model: Model<f64>,
+    state: State<f64>,
+    pwm: Pwm<f64>,
+    separation: Separation,
+    rad_per_volt: f64,
+    wheel_speed_rpm: f64,
+    wheel_speed_limit_rpm: f64,
+    /// PWM periods gone by.
+    periods: u64,
+    duty: Duty,
+    parts: Parts,
+}
+
+impl Plant {
+    /// The vehicle at the start of a manoeuvre: in the scenario's initial state, the servo settled at the voltage of the
+    /// manoeuvre's initial request.
+    ///
+    /// # Errors
+    /// If scenario or manoeuvre are not valid, or the servo's winding has no resistance.
+    pub fn new(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Result<Self, InvalidPlant> {
+        manoeuvre.validate()?;
+        let scenario = manoeuvre.begin(scenario);
+        scenario.validate()?;
+        validate_resistance(&scenario).map_err(InvalidManoeuvre::from)?;
+        let run = &scenario.run;
+        let model = Model::new(&scenario);
+        let pwm = Pwm::new(&scenario.servo, run.pwm_rate_hz);
+        let motor_v = scenario.motor_voltage_v();
+        let one_volt = Dither {
+            amplitude_v: 1.0,
+            ..scenario.dither
+        };
+        Ok(Self {
+            model,
+            state: model.initial_state(&scenario),
+            pwm,
+            separation: Separation::new(&manoeuvre.servo_filter, 1.0 / run.pwm_rate_hz, motor_v),
+            rad_per_volt: one_volt.amplitude_rad(),
+            wheel_speed_rpm: run.wheel_speed_rpm,
+            wheel_speed_limit_rpm: f64::INFINITY,
+            periods: 0,
+            duty: pwm.duty(motor_v),
+            parts: Parts {
+                torque_v: motor_v,
+                dither_v: 0.0,
+            },
+            manoeuvre: manoeuvre.clone(),
+            scenario,
+        })
+    }
+
+    /// Moves through one PWM period under `duty`, which must be one of this plant's PWM.
+    pub fn step(&mut self, duty: Duty) {
+        let period_s = 1.0 / self.scenario.run.pwm_rate_hz;
+        self.duty = duty;
+        self.parts = self.separation.step(self.pwm.volts(duty));
+        let steering = Steering {
+            motor_current_a: self.motor_current_a(),
+            ..self.scenario.steering
+        };
+        self.model.set_motor_torque_nm(steering.motor_torque_nm());
+        let injection = Injection::Shift {
+            offset: self.dither_rad(),
+        };
+        integrate::step(&self.model, &mut self.state, period_s, injection);
+        self.periods += 1;
+        self.change_speed(period_s);
+    }
+
+    fn change_speed(&mut self, period_s: f64) {
+        let profile_rpm = self.manoeuvre.wheel_speed_rpm.at(self.time_s());
+        self.wheel_speed_rpm = match self.manoeuvre.obey_speed_limit_rpm_per_s {
+            None => profile_rpm,
+            Some(rpm_per_s) => {
+                let most_rpm = rpm_per_s * period_s;
+                let wanted_rpm = profile_rpm.min(self.wheel_speed_limit_rpm);
+                wanted_rpm.clamp(
+                    self.wheel_speed_rpm - most_rpm,
+                    self.wheel_speed_rpm + most_rpm,
+                )
+            }
+        };
+        let vehicle = &self.scenario.vehicle;
+        self.model
+            .set_wheel_speed_rpm(vehicle, self.wheel_speed_rpm);
+    }
+
+    /// Takes the ECU's wheel speed limit, rpm; heeded if the manoeuvre says so.
+    pub fn set_wheel_speed_limit_rpm(&mut self, limit_rpm: f64) {
+        self.wheel_speed_limit_rpm = limit_rpm.max(SPEED_RANGE_RPM.0);
+    }
+
+    /// Time from the manoeuvre's start, s.
+    pub fn time_s(&self) -> f64 {
+        self.periods as f64 / self.scenario.run.pwm_rate_hz
+    }
+
+    /// The present state.
+    pub fn state(&self) -> &State<f64> {
+        &self.state
+    }
+
+    /// Goes on from another state.
+    pub fn set_state(&mut self, state: State<f64>) {
+        self.state = state;
+    }
+
+    /// The servo's PWM.
+    pub fn pwm(&self) -> &Pwm<f64> {
+        &self.pwm
+    }
+
+    /// Motor current in the last period, A.
+    pub fn motor_current_a(&self) -> f64 {
+        self.parts.torque_v / self.scenario.servo.winding_resistance_ohm
+    }
+
+    /// Dither ahead of the nonlinearities in the last period, rad.
+    pub fn dither_rad(&self) -> f64 {
+        self.rad_per_volt * self.parts.dither_v
+    }
+
+    /// What ideal sensors would tell now, and what the driver asks for.
+    pub fn truth(&self) -> Measurement<f64> {
+        let x = &self.state.x;
+        Measurement {
+            wheel_speed_rpm: self.wheel_speed_rpm,
+            yaw_rate_rad_per_s: x[YAW_RATE],
+            steering_angle_rad: x[STEERING_ANGLE],
+            steering_rate_rad_per_s: x[STEERING_RATE],
+            current_request_a: self.manoeuvre.current_request_at(self.time_s()),
+        }
+    }
+
+    /// The present moment, for recording.
+    pub fn record(&self) -> Record {
+        let truth = self.truth();
+        Record {
+            time_s: self.time_s(),
+            wheel_speed_rpm: truth.wheel_speed_rpm,
+            sideslip_rad: self.state.x[SIDESLIP],
+            yaw_rate_rad_per_s: truth.yaw_rate_rad_per_s,
+            steering_angle_rad: truth.steering_angle_rad,
+            steering_rate_rad_per_s: truth.steering_rate_rad_per_s,
+            friction_mode: self.state.friction,
+            current_request_a: truth.current_request_a,
+            motor_current_a: self.motor_current_a(),
+            dither_rad: self.dither_rad(),
+            duty_code: self.duty.code(),
+        }
+    }
+}
+
+fn validate_resistance(scenario: &Scenario<f64>) -> Result<(), OutOfRange> {
+    let value = scenario.servo.winding_resistance_ohm;
+    if value >= MIN_RESISTANCE_OHM {
+        return Ok(());
+    }
+    Err(OutOfRange {
+        section: "servo",
+        name: "winding_resistance_ohm",
+        value,
+        min: MIN_RESISTANCE_OHM,
+        max: 100.0,
+    })
+}
