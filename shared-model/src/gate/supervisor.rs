@@ -75,14 +75,11 @@ impl<T: Real> Supervisor<T> {
     /// A control tick: judges what was observed, and lets through what is within the limits.
     pub fn run(&mut self, seen: &Observation<T>) -> Setpoint<T> {
         let is_first = self.mode == Mode::Starting;
-        self.faults |= seen.found_outside;
-        self.faults |= self.plausibility.check(seen.measurement.as_ref());
-        self.check_frame_age(seen.measurement.is_some());
-        let (least, most) = self.window_counts;
-        let in_time = (least..=most).contains(&seen.elapsed_counts);
-        self.faults.add_if(!is_first && !in_time, Fault::TickWindow);
-        self.check_command(seen);
-
+        // What follows a fault is its consequence, and says nothing new.
+        if self.mode != Mode::Safe {
+            let found = self.judge(seen);
+            self.faults |= found;
+        }
         if !self.faults.is_empty() {
             self.mode = Mode::Safe;
         } else if is_first && seen.measurement.is_some() {
@@ -99,36 +96,49 @@ impl<T: Real> Supervisor<T> {
         self.setpoint
     }
 
-    fn check_frame_age(&mut self, is_new: bool) {
-        if is_new || self.mode == Mode::Starting {
-            self.ticks_since_frame = 0;
-            return;
+    fn judge(&mut self, seen: &Observation<T>) -> Faults {
+        let mut faults = seen.found_outside;
+        faults |= self.plausibility.check(seen.measurement.as_ref());
+        faults |= self.command_faults(seen);
+        if self.mode == Mode::Starting {
+            return faults;
         }
-        self.ticks_since_frame = self.ticks_since_frame.saturating_add(1);
+        self.ticks_since_frame = match seen.measurement {
+            Some(_) => 0,
+            None => self.ticks_since_frame.saturating_add(1),
+        };
         let is_old = self.ticks_since_frame > self.frame_age_ticks;
-        self.faults.add_if(is_old, Fault::FrameAge);
+        faults.add_if(is_old, Fault::FrameAge);
+        let (least, most) = self.window_counts;
+        let in_time = (least..=most).contains(&seen.elapsed_counts);
+        faults.add_if(!in_time, Fault::TickWindow);
+        faults
     }
 
-    fn check_command(&mut self, seen: &Observation<T>) {
+    fn command_faults(&self, seen: &Observation<T>) -> Faults {
         let above = |value: T, limit: T| {
             // Written so that NaN is above every limit.
             !(value.abs() <= limit * T::from_f64(1.0 + ROUNDING))
         };
-        let finite = seen.motor_v.is_finite() && seen.dither_amplitude_v.is_finite();
-        self.faults.add_if(!finite, Fault::CommandNotANumber);
-        self.faults.add_if(
-            above(seen.motor_v, self.limits.motor_voltage_v),
+        let (motor_v, amplitude_v) = (seen.motor_v, seen.dither_amplitude_v);
+        let mut faults = Faults::NONE;
+        faults.add_if(
+            !motor_v.is_finite() || !amplitude_v.is_finite(),
+            Fault::CommandNotANumber,
+        );
+        faults.add_if(
+            above(motor_v, self.limits.motor_voltage_v),
             Fault::MotorVoltage,
         );
-        self.faults.add_if(
-            above(seen.motor_v - self.setpoint.motor_v, self.slew_v),
+        faults.add_if(
+            above(motor_v - self.setpoint.motor_v, self.slew_v),
             Fault::MotorSlew,
         );
-        let amplitude = seen.dither_amplitude_v;
-        self.faults.add_if(
-            amplitude < T::zero() || above(amplitude, self.amplitude_limit_v),
+        faults.add_if(
+            amplitude_v < T::zero() || above(amplitude_v, self.amplitude_limit_v),
             Fault::DitherAmplitude,
         );
+        faults
     }
 
     fn towards_neutral(&self) -> Setpoint<T> {
@@ -154,7 +164,7 @@ impl<T: Real> Supervisor<T> {
         self.mode
     }
 
-    /// Everything found since the start.
+    /// What put the ECU into its safe state.
     pub fn faults(&self) -> Faults {
         self.faults
     }

@@ -1,4 +1,7 @@
 //! A drive: the vehicle on its manoeuvre, answering an ECU once a PWM period.
+//!
+//! An ECU starts with a neutral servo and slews to the driver's request. So that this is over when the manoeuvre begins, the
+//! vehicle is held in its initial state meanwhile, its sensors on: the lead-in.
 
 use super::manoeuvre::Manoeuvre;
 use super::plant::{InvalidPlant, Plant};
@@ -13,6 +16,24 @@ use shared_model::frame::{
 use shared_model::servo::Duty;
 use shared_model::signal::{Actuation, Measurement};
 
+/// Control ticks of the lead-in beyond the slewing.
+const SPARE_TICKS: f64 = 20.0;
+
+/// Control ticks for which the vehicle is held while the ECU starts.
+fn lead_in_ticks(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u32 {
+    let request_a = manoeuvre.current_request_at(0.0).abs();
+    let slewing_s = request_a / scenario.policy.motor_slew_a_per_s;
+    (slewing_s * scenario.run.control_rate_hz + SPARE_TICKS).ceil() as u32
+}
+
+/// The scenario as the ECU has it: its dither sets in later by the lead-in.
+pub fn ecu_scenario(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Scenario<f32> {
+    let mut own = *scenario;
+    let lead_in_ticks = f64::from(lead_in_ticks(scenario, manoeuvre));
+    own.dither.start_time_s += lead_in_ticks / scenario.run.control_rate_hz;
+    own.map(&|value| value as f32)
+}
+
 /// The vehicle's end of the exchange.
 #[derive(Debug, Clone)]
 pub struct Drive {
@@ -22,7 +43,9 @@ pub struct Drive {
     receiver: Receiver,
     period_counts: u16,
     periods_a_tick: u32,
+    /// PWM periods from the ECU's start.
     periods: u32,
+    lead_in_periods: u32,
     actuation: Option<Actuation<f32>>,
 }
 
@@ -33,14 +56,16 @@ impl Drive {
     /// If scenario or manoeuvre are not valid.
     pub fn new(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Result<Self, InvalidPlant> {
         let plant = Plant::new(scenario, manoeuvre)?;
+        let periods_a_tick = scenario.periods_per_tick();
         Ok(Self {
             period_counts: plant.pwm().neutral().period(),
             plant,
             sensors: Sensors::new(&manoeuvre.sensors),
             sender: Sender::new(SENSOR_DATA_ID),
             receiver: Receiver::new(ACTUATOR_DATA_ID, MAX_DELTA_COUNTER),
-            periods_a_tick: scenario.periods_per_tick(),
+            periods_a_tick,
             periods: 0,
+            lead_in_periods: periods_a_tick * lead_in_ticks(scenario, manoeuvre),
             actuation: None,
         })
     }
@@ -54,7 +79,9 @@ impl Drive {
         // The servo's driver has no more counts than its period.
         let code = from_ecu.duty_code.min(self.period_counts);
         let duty = Duty::new(code, self.period_counts).expect("cut to the period above");
-        self.plant.step(duty);
+        if self.periods >= self.lead_in_periods {
+            self.plant.step(duty);
+        }
         self.periods += 1;
         let is_tick = self.periods.is_multiple_of(self.periods_a_tick);
         Packet {
@@ -77,6 +104,11 @@ impl Drive {
     fn sensor_frame(&mut self) -> FrameBytes {
         let measurement: Measurement<f32> = self.sensors.sample(&self.plant.truth());
         encode_measurement(&measurement, &mut self.sender)
+    }
+
+    /// PWM periods from the ECU's start to the manoeuvre's end.
+    pub fn total_periods(&self) -> u32 {
+        self.lead_in_periods + self.plant.total_periods()
     }
 
     /// What the ECU last told.

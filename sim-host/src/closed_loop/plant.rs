@@ -126,6 +126,12 @@ impl Plant {
         self.wheel_speed_limit_rpm = limit_rpm.max(SPEED_RANGE_RPM.0);
     }
 
+    /// PWM periods of the whole manoeuvre.
+    pub fn total_periods(&self) -> u32 {
+        let run = &self.scenario.run;
+        (run.duration_s * run.pwm_rate_hz).round() as u32
+    }
+
     /// Time from the manoeuvre's start, s.
     pub fn time_s(&self) -> f64 {
         self.periods as f64 / self.scenario.run.pwm_rate_hz
