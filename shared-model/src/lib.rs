@@ -6,7 +6,9 @@
 extern crate std;
 
 pub mod dither;
+pub mod e2e;
 pub mod exchange;
+pub mod frame;
 pub mod friction;
 pub mod integrate;
 pub mod open_loop;
