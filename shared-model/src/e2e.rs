@@ -79,7 +79,7 @@ pub struct Receiver {
 
 impl Receiver {
     /// A receiver of the frames with that data ID. `max_delta_counter`, from 1 to 254, is the greatest step of the
-    /// counter that is tolerated: one less frame than that may be missing.
+    /// counter that is tolerated: one frame fewer than that may be missing.
     pub const fn new(data_id: u16, max_delta_counter: u8) -> Self {
         Self {
             data_id,

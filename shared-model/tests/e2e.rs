@@ -131,6 +131,18 @@ fn damage_and_silence_leave_the_counter() {
     assert_eq!(receiver.check(Some(&frames[1])), Status::Ok);
 }
 
+/// What the package autosar-e2e 1.0.0 makes of zeros; `tests/frames.rs` asks it about frames of all kinds.
+#[test]
+fn known_answers() {
+    let mut sender = Sender::new(DATA_ID);
+    for answer in [[0x04, 0x27, 0], [0x07, 0x10, 1], [0x02, 0x49, 2]] {
+        let mut frame = [0; FRAME_LEN];
+        sender.protect(&mut frame);
+        assert_eq!(frame[..3], answer);
+        assert_eq!(frame[3..], [0; FRAME_LEN - 3]);
+    }
+}
+
 /// The same bytes from the sender of another kind of frame: every other data ID is found.
 #[test]
 fn masquerade_is_found() {

@@ -35,7 +35,7 @@ pub fn ensure() -> Result<()> {
     }
     let folder = folder()?;
     println!(
-        "setup: Python packages of {} into {}",
+        "setup: installing the Python packages of {} into {}",
         requirements().display(),
         folder.display()
     );
