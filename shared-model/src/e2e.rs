@@ -1,7 +1,8 @@
 //! End-to-end protection of frames: AUTOSAR E2E profile 5, from the sender's memory to the receiver's.
 //!
-//! A frame begins with a CRC-16 (2 bytes, little-endian) and a counter (1 byte). The checksum also covers a data ID that is not sent, so that a frame
-//! taken for another one is found like a flipped bit; the counter tells loss, repetition and wrong order apart.
+//! A frame begins with a CRC-16 (2 bytes, little-endian) and a counter (1 byte). The checksum also covers a data ID that is
+//! not sent, so that a frame taken for another one is found like a flipped bit; the counter tells loss, repetition and
+//! wrong order apart.
 //! Source: AUTOSAR FO, "E2E Protocol Specification" (PRS_E2EProtocol), profile 5, with the header at offset 0.
 
 use crate::exchange::FrameBytes;
@@ -78,7 +79,7 @@ pub struct Receiver {
 
 impl Receiver {
     /// A receiver of the frames with that data ID. `max_delta_counter`, from 1 to 254, is the greatest step of the
-    /// counter that is tolerated: one less frame than that may be missing.
+    /// counter that is tolerated: one frame fewer than that may be missing.
     pub const fn new(data_id: u16, max_delta_counter: u8) -> Self {
         Self {
             data_id,

@@ -24,8 +24,9 @@ pub const SENSOR_DATA_ID: u16 = 0x5A01;
 pub const ACTUATOR_DATA_ID: u16 = 0x5A02;
 /// Greatest tolerated step of the counter, for both frames.
 ///
-/// Two control ticks without a frame are bridged, 2 ms of a motion whose cycles take about a second. A frame out of place
-/// has, its counter being arbitrary, a chance of 3 in 256 to be taken for a good one, so this is not larger than needed.
+/// Two lost frames in a row are bridged: in the 3 ms to the next one, at 1 kHz, even the chaotic motion at 1750 rpm moves no
+/// signal by more than 2 % of its range. A whole frame out of place, its counter being arbitrary, passes with a chance of
+/// 3 in 256, so this is not larger than needed.
 pub const MAX_DELTA_COUNTER: u8 = 3;
 
 /// A frame as words of four bytes, on whose borders its numbers lie.

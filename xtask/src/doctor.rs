@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use crate::setup::{qemu, target};
+use crate::setup::{python, qemu, target};
 use crate::{rustup, workspace};
 
 /// One thing that is needed.
@@ -14,7 +14,7 @@ struct Item {
 
 /// Prints the table; an error if something is missing.
 pub fn run() -> Result<()> {
-    let items = [toolchain()?, target()?, qemu(), runner()?];
+    let items = [toolchain()?, target()?, qemu(), runner()?, python()?];
     let width = items
         .iter()
         .map(|item| item.need.len())
@@ -84,5 +84,16 @@ fn runner() -> Result<Item> {
     Ok(Item {
         need: "runner sim-host".to_owned(),
         state: found.ok_or_else(cure),
+    })
+}
+
+fn python() -> Result<Item> {
+    let state = match python::found()? {
+        Some((path, version)) => Ok(format!("{version}, {}", path.display())),
+        None => Err(python::plan()?),
+    };
+    Ok(Item {
+        need: "Python packages of the tests".to_owned(),
+        state,
     })
 }

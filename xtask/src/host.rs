@@ -49,6 +49,17 @@ impl Manager {
         }
     }
 
+    /// The one line to type for Python 3 with its module venv.
+    pub fn python_line(self) -> &'static str {
+        match self {
+            Self::Apt => "sudo apt-get update && sudo apt-get install python3-venv",
+            Self::Dnf => "sudo dnf install python3",
+            Self::Pacman => "sudo pacman -S python",
+            Self::Brew => "brew install python",
+            Self::Winget => "winget install Python.Python.3.13",
+        }
+    }
+
     /// The one line to type for QEMU.
     pub fn qemu_line(self) -> &'static str {
         match self {
@@ -90,6 +101,15 @@ impl Apt {
             println!("   apt-get update did not fetch everything; going on with what is known");
         }
         Ok(())
+    }
+
+    /// Installs a package; before that fetches the lists of packages where they lack it, or name files that are gone.
+    pub fn bring(self, package: &str) -> Result<()> {
+        if candidate(package).is_some() && self.install(&[package]).is_ok() {
+            return Ok(());
+        }
+        self.update()?;
+        self.install(&[package])
     }
 
     /// Installs packages without what they merely recommend.
@@ -191,10 +211,9 @@ mod tests {
     #[test]
     fn every_manager_names_itself_in_its_line() {
         for manager in MANAGERS {
-            assert!(
-                manager.qemu_line().contains(manager.program()),
-                "{manager:?}"
-            );
+            for line in [manager.qemu_line(), manager.python_line()] {
+                assert!(line.contains(manager.program()), "{manager:?}");
+            }
         }
     }
 }

@@ -50,7 +50,8 @@ enum Command {
     ///
     /// Says what it installs, and where, before it does it. The compiler's target comes from rustup, or where
     /// rustup cannot download, from Debian's Rust packages; QEMU comes from the system's packages. The runner is
-    /// the program that `cargo run` in firmware/ starts.
+    /// the program that `cargo run` in firmware/ starts. Python packages that tests compare with go into
+    /// target/python, and into no Python of this machine.
     #[command(
         after_help = "Example:\n  cargo xtask setup && cd firmware && cargo run --profile firmware --bin ecu"
     )]

@@ -9,6 +9,8 @@ use crate::{setup, workspace};
 pub fn run() -> Result<()> {
     let toolchain = stage("set-up", setup::tools)?;
     stage("runner", build_sim_host)?;
+    // Last: without these only a test is missing.
+    stage("Python packages of the tests", setup::python::ensure)?;
     println!(
         "the firmware builds with toolchain {toolchain}; its runner is {}",
         workspace::sim_host()?.display()

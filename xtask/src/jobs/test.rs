@@ -17,6 +17,8 @@ const MISSING_FUNCTION: &str = "a_panic_is_reachable_from_the_control_path";
 /// Sets up, builds and tests.
 pub fn run() -> Result<()> {
     let toolchain = stage("set-up", setup::tools)?;
+    // Before any test: a comparison that would be left out is no pass.
+    stage("Python packages of the tests", setup::python::ensure)?;
     stage("firmware", || {
         firmware::build(&toolchain, &["--bin", "ecu", "--bin", "fault-drill"])
     })?;

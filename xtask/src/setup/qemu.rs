@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::host::{self, Apt, Manager};
+use crate::host::{Apt, Manager};
 use crate::process;
 
 /// The program's name, and its package's where set-up installs it.
@@ -27,12 +27,8 @@ pub fn ensure() -> Result<()> {
         bail!("{PROGRAM} is missing: {}, then run this again", by_hand());
     };
     println!("setup: installing the system's package {PROGRAM}");
-    if host::candidate(PROGRAM).is_none() || apt.install(&[PROGRAM]).is_err() {
-        // The list of packages is absent, or so old that it names files that are gone.
-        apt.update()?;
-        apt.install(&[PROGRAM])
-            .with_context(|| format!("{PROGRAM} is missing: {}, then run this again", by_hand()))?;
-    }
+    apt.bring(PROGRAM)
+        .with_context(|| format!("{PROGRAM} is missing: {}, then run this again", by_hand()))?;
     if found().is_none() {
         bail!("the package {PROGRAM} is installed, but there is no {PROGRAM} on PATH");
     }

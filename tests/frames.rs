@@ -1,0 +1,346 @@
+//! Frames against implementations that share no code with this project: the Python packages autosar-e2e (in C) and
+//! cantools, the latter with the DBC file; and for the statuses, which the Python package does not give, a Rust crate.
+
+use autosar_e2e::profile5::{Profile5, Profile5Config};
+use autosar_e2e::{E2EProfile, E2EStatus};
+use fastrand::Rng;
+use shared_model::e2e::{Receiver, Sender, Status};
+use shared_model::exchange::{FRAME_LEN, FrameBytes};
+use shared_model::frame::{
+    ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, encode_actuation, encode_measurement,
+};
+use shared_model::signal::{Actuation, Measurement, Mode};
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+/// Frames of each kind: the counter wraps around.
+const FRAMES: usize = 400;
+
+/// A kind of frame: its name in the DBC file, and its data ID.
+type Kind = (&'static str, u16);
+const SENSOR: Kind = ("SensorFrame", SENSOR_DATA_ID);
+const ACTUATOR: Kind = ("ActuatorFrame", ACTUATOR_DATA_ID);
+
+/// The Python of `cargo xtask setup`.
+///
+/// # Panics
+/// If it is not there with the packages as pinned: a comparison that cannot be made has not passed.
+fn python() -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("python");
+    // Set-up leaves this copy when everything is installed.
+    let installed = fs::read_to_string(folder.join("requirements.txt")).unwrap_or_default();
+    assert!(
+        installed == include_str!("python/requirements.txt"),
+        "untested: {} does not have the packages of tests/python/requirements.txt: run `cargo xtask setup`",
+        folder.display()
+    );
+    folder.join(match cfg!(windows) {
+        true => "Scripts/python.exe",
+        false => "bin/python",
+    })
+}
+
+/// Asks tests/python/check_frames.py; an answer, as its words, for every question.
+fn ask(questions: &[String]) -> Vec<Vec<String>> {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut child = Command::new(python())
+        // Isolated: no other packages by way of the environment.
+        .arg("-I")
+        .arg(tests.join("python/check_frames.py"))
+        .arg(tests.with_file_name("docs").join("dithersteer.dbc"))
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("Python starts");
+    let mut input = child.stdin.take().expect("stdin is piped");
+    // A script that ended early says why on its own; its exit code is the answer.
+    let _ = input.write_all(questions.join("\n").as_bytes());
+    drop(input);
+    let output = child.wait_with_output().expect("Python ends");
+    assert!(
+        output.status.success(),
+        "check_frames.py: {}",
+        output.status
+    );
+    let answers: Vec<Vec<String>> = String::from_utf8(output.stdout)
+        .expect("the answers are text")
+        .lines()
+        .map(|line| line.split(' ').map(str::to_owned).collect())
+        .collect();
+    assert_eq!(answers.len(), questions.len());
+    answers
+}
+
+fn hex(frame: &FrameBytes) -> String {
+    frame.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn question((name, _): Kind, frame: &FrameBytes) -> String {
+    format!("{name} {}", hex(frame))
+}
+
+/// A plain number, any bits, or one of the ends of what an f32 can be.
+fn number(rng: &mut Rng) -> f32 {
+    let bits = match rng.u8(..4) {
+        0 | 1 => (4e3 * rng.f32() - 2e3).to_bits(),
+        2 => rng.u32(..),
+        _ => {
+            let ends = [
+                0,
+                1,
+                0x7f_ffff,
+                0x80_0000,
+                0x7f7f_ffff,
+                0x7f80_0000,
+                0x7fc0_0000,
+                0x7f80_0001,
+            ];
+            rng.choice(ends).expect("there are ends") | u32::from(rng.bool()) << 31
+        }
+    };
+    f32::from_bits(bits)
+}
+
+fn measurement(rng: &mut Rng) -> Measurement<f32> {
+    Measurement {
+        wheel_speed_rpm: number(rng),
+        yaw_rate_rad_per_s: number(rng),
+        steering_angle_rad: number(rng),
+        steering_rate_rad_per_s: number(rng),
+        current_request_a: number(rng),
+    }
+}
+
+fn actuation(rng: &mut Rng) -> Actuation<f32> {
+    Actuation {
+        mode: Mode::from_code(rng.u8(..3)).expect("there are three modes"),
+        faults: rng.u32(..),
+        motor_voltage_v: number(rng),
+        dither_amplitude_v: number(rng),
+        wheel_speed_limit_rpm: number(rng),
+        warnings: rng.u16(..),
+        sensor_counter: rng.u8(..),
+    }
+}
+
+/// A signal's value as the other side should read it.
+#[derive(Debug)]
+enum Value {
+    Number(f32),
+    Text(String),
+}
+
+impl Value {
+    fn text(value: impl ToString) -> Self {
+        Self::Text(value.to_string())
+    }
+
+    /// Whether `other` says the same: numbers to the bit, NaN as a class.
+    fn is(&self, other: &str) -> bool {
+        match self {
+            Self::Text(text) => text == other,
+            Self::Number(number) => {
+                // The other side prints f64; none of its digits may be lost on the way to f32 and back.
+                let read: f64 = other.parse().expect("a number");
+                let same = read.to_bits() == f64::from(*number).to_bits();
+                same || (read.is_nan() && number.is_nan())
+            }
+        }
+    }
+}
+
+type Signals = Vec<(&'static str, Value)>;
+
+fn sensor_signals(m: &Measurement<f32>) -> Signals {
+    vec![
+        ("wheel_speed_rpm", Value::Number(m.wheel_speed_rpm)),
+        ("yaw_rate_rad_per_s", Value::Number(m.yaw_rate_rad_per_s)),
+        ("steering_angle_rad", Value::Number(m.steering_angle_rad)),
+        (
+            "steering_rate_rad_per_s",
+            Value::Number(m.steering_rate_rad_per_s),
+        ),
+        ("current_request_a", Value::Number(m.current_request_a)),
+    ]
+}
+
+fn actuator_signals(a: &Actuation<f32>) -> Signals {
+    vec![
+        ("mode", Value::text(format!("{:?}", a.mode))),
+        ("faults", Value::text(a.faults)),
+        ("motor_voltage_v", Value::Number(a.motor_voltage_v)),
+        ("dither_amplitude_v", Value::Number(a.dither_amplitude_v)),
+        (
+            "wheel_speed_limit_rpm",
+            Value::Number(a.wheel_speed_limit_rpm),
+        ),
+        ("warnings", Value::text(a.warnings)),
+        ("sensor_counter", Value::text(a.sensor_counter)),
+    ]
+}
+
+/// The frames of one sender of each kind, with what is in them.
+fn frames() -> Vec<(Kind, FrameBytes, Signals)> {
+    let mut rng = Rng::with_seed(4);
+    let mut sender = Sender::new(SENSOR_DATA_ID);
+    let sensors: Vec<_> = (0..FRAMES)
+        .map(|_| measurement(&mut rng))
+        .map(|m| {
+            (
+                SENSOR,
+                encode_measurement(&m, &mut sender),
+                sensor_signals(&m),
+            )
+        })
+        .collect();
+    let mut sender = Sender::new(ACTUATOR_DATA_ID);
+    let actuators = (0..FRAMES).map(|_| actuation(&mut rng)).map(|a| {
+        (
+            ACTUATOR,
+            encode_actuation(&a, &mut sender),
+            actuator_signals(&a),
+        )
+    });
+    sensors.into_iter().chain(actuators).collect()
+}
+
+#[test]
+fn bytes_checks_and_signals_are_those_of_python() {
+    let frames = frames();
+    let questions: Vec<String> = frames
+        .iter()
+        .map(|(kind, frame, _)| question(*kind, frame))
+        .collect();
+    for (index, ((kind, frame, signals), answer)) in frames.iter().zip(ask(&questions)).enumerate()
+    {
+        let context = format!("{} {index}: {answer:?}", kind.0);
+        let [protected, verdict, decoded @ ..] = &answer[..] else {
+            panic!("{context}");
+        };
+        assert_eq!(*protected, hex(frame), "{context}");
+        assert_eq!(verdict, "whole", "{context}");
+
+        let crc = u16::from_le_bytes([frame[0], frame[1]]);
+        let counter = (index % FRAMES) as u8;
+        let header = [("crc", Value::text(crc)), ("counter", Value::text(counter))];
+        assert_eq!(decoded.len(), header.len() + signals.len(), "{context}");
+        for ((name, value), pair) in header.iter().chain(signals).zip(decoded) {
+            let (decoded_name, decoded_value) = pair.split_once('=').expect("name=value");
+            assert_eq!(decoded_name, *name, "{context}");
+            assert!(value.is(decoded_value), "{name} is {value:?}; {context}");
+        }
+    }
+}
+
+/// Every flipped bit, random damage, and frames of the other kind: both sides find them, and the same ones.
+#[test]
+fn damaged_and_foreign_frames_are_bad_for_both() {
+    let mut rng = Rng::with_seed(5);
+    let mut received: Vec<(Kind, FrameBytes)> = Vec::new();
+    for (index, (kind, frame, _)) in frames().into_iter().enumerate() {
+        let other = if kind == SENSOR { ACTUATOR } else { SENSOR };
+        received.push((other, frame));
+        let mut damaged = frame;
+        damaged[rng.usize(..FRAME_LEN)] = rng.u8(..);
+        damaged[rng.usize(..FRAME_LEN)] = rng.u8(..);
+        received.push((kind, damaged));
+        let bit = index % (8 * FRAME_LEN);
+        let mut flipped = frame;
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        received.push((kind, flipped));
+    }
+    let questions: Vec<String> = received
+        .iter()
+        .map(|(kind, frame)| question(*kind, frame))
+        .collect();
+    let mut errors = 0;
+    for ((kind, frame), answer) in received.iter().zip(ask(&questions)) {
+        let status = Receiver::new(kind.1, MAX_DELTA_COUNTER).check(Some(frame));
+        let verdict = if status == Status::Error {
+            "error"
+        } else {
+            "whole"
+        };
+        assert_eq!(answer[1], verdict, "{} {}: {status:?}", kind.0, hex(frame));
+        errors += usize::from(status == Status::Error);
+    }
+    // Random damage may by chance write the bytes that were there.
+    assert!(
+        errors > received.len() - 10,
+        "{errors} of {}",
+        received.len()
+    );
+}
+
+#[test]
+fn dbc_file_has_the_constants() {
+    let kinds = [SENSOR, ACTUATOR];
+    for ((_, data_id), answer) in kinds
+        .iter()
+        .zip(ask(&kinds.map(|(name, _)| name.to_owned())))
+    {
+        let expected = format!(
+            "can_fd=True length={FRAME_LEN} profile=PROFILE_05 data_id={data_id} max_delta_counter={MAX_DELTA_COUNTER}"
+        );
+        assert_eq!(answer.join(" "), expected);
+    }
+}
+
+/// A link that loses, repeats, reorders, damages and confuses frames; both receivers say the same of each.
+#[test]
+fn statuses_are_those_of_another_crate() {
+    let mut rng = Rng::with_seed(6);
+    let mut frames = Vec::new();
+    let mut sender = Sender::new(SENSOR_DATA_ID);
+    for _ in 0..20_000 {
+        frames.push(encode_measurement(&measurement(&mut rng), &mut sender));
+    }
+    let foreign = encode_actuation(&actuation(&mut rng), &mut Sender::new(ACTUATOR_DATA_ID));
+    let mut receiver = Receiver::new(SENSOR_DATA_ID, MAX_DELTA_COUNTER);
+    let mut other = Profile5::new(Profile5Config {
+        data_length: 8 * FRAME_LEN as u16,
+        data_id: SENSOR_DATA_ID,
+        max_delta_counter: MAX_DELTA_COUNTER,
+        offset: 0,
+    })
+    .expect("the configuration is valid");
+
+    let mut seen = Vec::new();
+    // The first frame as it is: that crate starts with another counter than the profile has, 0 for 255.
+    let mut number = 0;
+    let mut received = frames[0];
+    while number + 7 < frames.len() {
+        let status = receiver.check(Some(&received));
+        let expected = match other.check(&received).expect("the length is right") {
+            E2EStatus::Ok => Status::Ok,
+            E2EStatus::OkSomeLost => Status::OkSomeLost,
+            E2EStatus::CrcError => Status::Error,
+            E2EStatus::Repeated => Status::Repeated,
+            E2EStatus::WrongSequence => Status::WrongSequence,
+            status => panic!("{status:?} is none of profile 5"),
+        };
+        assert_eq!(status, expected, "frame {number}");
+        seen.push(status);
+
+        received = match rng.u8(..10) {
+            // Repeated, or from before.
+            0 => frames[number.saturating_sub(rng.usize(..4))],
+            1 => foreign,
+            event => {
+                // The next one, or after a loss.
+                number += if event < 5 { rng.usize(1..7) } else { 1 };
+                frames[number]
+            }
+        };
+        if rng.u8(..10) == 0 {
+            received[rng.usize(..FRAME_LEN)] ^= 1 << rng.u8(..8);
+        }
+    }
+    use Status::{Error, Ok, OkSomeLost, Repeated, WrongSequence};
+    for status in [Ok, OkSomeLost, Error, Repeated, WrongSequence] {
+        let count = seen.iter().filter(|&&seen| seen == status).count();
+        assert!(count > 100, "{status:?} was compared {count} times");
+    }
+}

@@ -1,0 +1,55 @@
+"""Answers questions about frames with autosar-e2e and cantools, which share no code with this project.
+
+The DBC file is named on the command line. Each line on standard input gets one line in answer:
+
+MESSAGE      what the DBC file says of the message: key=value ...
+MESSAGE HEX  the bytes protected anew, the verdict of the check on the bytes as they are, then signal=value ...
+"""
+
+import sys
+
+import cantools
+from e2e import p05
+
+
+def attribute(message, name):
+    return message.dbc.attributes[name].value
+
+
+def description(message):
+    return {
+        "can_fd": message.is_fd,
+        "length": message.length,
+        "profile": attribute(message, "E2EProfile"),
+        "data_id": attribute(message, "E2EDataId"),
+        "max_delta_counter": attribute(message, "E2EMaxDeltaCounter"),
+    }
+
+
+def protected(data, data_id):
+    # Without the checksum that is asked for, and one behind: the package counts up before it protects.
+    anew = bytearray(data)
+    anew[0:2] = bytes(2)
+    anew[2] = (anew[2] - 1) % 256
+    p05.e2e_p05_protect(anew, data_id)
+    return anew.hex()
+
+
+def pairs(values):
+    return [f"{name}={value}" for name, value in values.items()]
+
+
+def answer(message, data=None):
+    if data is None:
+        return pairs(description(message))
+    data = bytes.fromhex(data)
+    data_id = attribute(message, "E2EDataId")
+    verdict = "whole" if p05.e2e_p05_check(data, data_id) else "error"
+    return [protected(data, data_id), verdict, *pairs(message.decode(data))]
+
+
+database = cantools.database.load_file(sys.argv[1])
+# All questions first: who asks may not read before everything is written.
+for line in sys.stdin.read().splitlines():
+    name, *data = line.split()
+    print(*answer(database.get_message_by_name(name), *data))
