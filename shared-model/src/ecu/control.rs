@@ -62,6 +62,8 @@ pub struct ControlOutput<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Channel<T> {
     receiver: Receiver,
+    /// Counter of the last valid frame.
+    counter: u8,
     measurement: Option<Measurement<T>>,
     controller: Controller<T>,
     supervisor: Supervisor<T>,
@@ -74,6 +76,9 @@ impl<T: Real> Channel<T> {
         let new =
             new.map(|frame| decode_measurement(frame).map(&|signal| T::from_f64(signal.into())));
         self.measurement = new.or(self.measurement);
+        if new.is_some() {
+            self.counter = self.receiver.counter();
+        }
         let command = match &self.measurement {
             Some(measurement) => self.controller.run(measurement),
             None => Command {
@@ -95,7 +100,7 @@ impl<T: Real> Channel<T> {
             dither_amplitude_v: setpoint.dither_amplitude_v,
             wheel_speed_limit_rpm: self.supervisor.wheel_speed_limit_rpm(),
             warnings: warning(status).map_or(0, |warning| 1 << warning as u16),
-            sensor_counter: self.receiver.counter(),
+            sensor_counter: self.counter,
         };
         (setpoint, actuation)
     }
@@ -124,6 +129,7 @@ impl<T: Real> ControlTask<T> {
         Self {
             channels: Duplex::new(Channel {
                 receiver: Receiver::new(SENSOR_DATA_ID, MAX_DELTA_COUNTER),
+                counter: u8::MAX,
                 measurement: None,
                 controller: Controller::new(scenario, schedule),
                 supervisor: Supervisor::new(scenario, clock_hz),
