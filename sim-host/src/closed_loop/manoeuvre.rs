@@ -83,9 +83,10 @@ pub struct Manoeuvre {
     pub current_request_a: Profile,
     /// A sine on top of it.
     pub current_request_sine: Option<RequestSine>,
-    /// The vehicle keeps to the wheel speed limit that the ECU demands, and changes its speed by no more than this,
-    /// rpm/s; it follows a steeper profile late. Without it the vehicle follows its profile and heeds no limit.
-    pub obey_speed_limit_rpm_per_s: Option<f64>,
+    /// The vehicle keeps to the wheel speed limit that the ECU demands, and changes its speed by no more than this, rpm/s, up
+    /// to 1e6; it follows a steeper profile late. With 0, as without it, it follows its profile and heeds no limit.
+    #[serde(default)]
+    pub obey_speed_limit_rpm_per_s: f64,
     /// What is wrong with the sensors.
     #[serde(default)]
     pub sensors: SensorSettings,
@@ -102,7 +103,7 @@ impl Manoeuvre {
             wheel_speed_rpm: Profile::constant(wheel_speed_rpm),
             current_request_a: Profile::constant(current_request_a),
             current_request_sine: None,
-            obey_speed_limit_rpm_per_s: None,
+            obey_speed_limit_rpm_per_s: 0.0,
             sensors: SensorSettings::default(),
             servo_filter: ServoFilter::default(),
         }
@@ -140,16 +141,14 @@ impl Manoeuvre {
         if let Some(sine) = self.current_request_sine {
             sine.validate()?;
         }
-        if let Some(rate) = self.obey_speed_limit_rpm_per_s {
-            validate_rate(rate)?;
-        }
+        validate_rate(self.obey_speed_limit_rpm_per_s)?;
         self.sensors.validate()?;
         Ok(self.servo_filter.validate()?)
     }
 }
 
 fn validate_rate(rpm_per_s: f64) -> Result<(), OutOfRange> {
-    let (min, max) = (1e-3, 1e6);
+    let (min, max) = (0.0, 1e6);
     if (min..=max).contains(&rpm_per_s) {
         return Ok(());
     }

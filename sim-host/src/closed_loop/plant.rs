@@ -105,16 +105,13 @@ impl Plant {
 
     fn change_speed(&mut self, period_s: f64) {
         let profile_rpm = self.manoeuvre.wheel_speed_rpm.at(self.time_s());
-        self.wheel_speed_rpm = match self.manoeuvre.obey_speed_limit_rpm_per_s {
-            None => profile_rpm,
-            Some(rpm_per_s) => {
-                let most_rpm = rpm_per_s * period_s;
-                let wanted_rpm = profile_rpm.min(self.wheel_speed_limit_rpm);
-                wanted_rpm.clamp(
-                    self.wheel_speed_rpm - most_rpm,
-                    self.wheel_speed_rpm + most_rpm,
-                )
-            }
+        let most_rpm = self.manoeuvre.obey_speed_limit_rpm_per_s * period_s;
+        self.wheel_speed_rpm = if most_rpm > 0.0 {
+            let wanted_rpm = profile_rpm.min(self.wheel_speed_limit_rpm);
+            let change_rpm = wanted_rpm - self.wheel_speed_rpm;
+            self.wheel_speed_rpm + change_rpm.clamp(-most_rpm, most_rpm)
+        } else {
+            profile_rpm
         };
         let vehicle = &self.scenario.vehicle;
         self.model
@@ -142,11 +139,6 @@ impl Plant {
         &self.state
     }
 
-    /// Goes on from another state.
-    pub fn set_state(&mut self, state: State<f64>) {
-        self.state = state;
-    }
-
     /// The servo's PWM.
     pub fn pwm(&self) -> &Pwm<f64> {
         &self.pwm
@@ -159,7 +151,8 @@ impl Plant {
 
     /// Dither ahead of the nonlinearities in the last period, rad.
     pub fn dither_rad(&self) -> f64 {
-        self.rad_per_volt * self.parts.dither_v
+        let limit_rad = self.manoeuvre.servo_filter.dither_limit_rad;
+        (self.rad_per_volt * self.parts.dither_v).clamp(-limit_rad, limit_rad)
     }
 
     /// What ideal sensors would tell now, and what the driver asks for.
