@@ -13,6 +13,8 @@ pub mod open_loop;
 pub mod parameter;
 pub mod real;
 pub mod scenario;
+pub mod schedule;
+pub mod schedule_table;
 pub mod servo;
 pub mod settings;
 pub mod signal;
