@@ -139,7 +139,10 @@ struct Row {
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
-    let plans = [Waveform::Square, Waveform::Sine].map(|waveform| arguments.plan(waveform));
+    let plans = [
+        arguments.plan(&scenario, Waveform::Square)?,
+        arguments.plan(&scenario, Waveform::Sine)?,
+    ];
     let files = [
         &arguments.out,
         &arguments.csv,
@@ -150,10 +153,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         check_free(path, arguments.force)?;
     }
     let mut analyses = Vec::new();
-    for plan in plans {
-        let (waveform, plan) = plan?;
-        let mut scenario = scenario;
-        scenario.dither.waveform = waveform;
+    for (scenario, plan) in plans {
         let made = with_progress(runs(&plan) / 2, |watch| schedule(&scenario, &plan, watch))?;
         let Some(analysis) = made else {
             bail!("interrupted: a schedule needs all of its runs; no file was written");
@@ -171,7 +171,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 }
 
 impl Arguments {
-    fn plan(&self, waveform: Waveform) -> anyhow::Result<(Waveform, Plan)> {
+    /// The scenario with this waveform and its plan, checked.
+    fn plan(
+        &self,
+        scenario: &Scenario<f64>,
+        waveform: Waveform,
+    ) -> anyhow::Result<(Scenario<f64>, Plan)> {
         ensure!(
             (0.0..=1.0).contains(&self.margin),
             "--margin {}: must be a share from 0 to 1",
@@ -191,7 +196,10 @@ impl Arguments {
             margin: self.margin,
             timing: Timing::new(self.transient, self.time)?,
         };
-        Ok((waveform, plan))
+        let mut scenario = *scenario;
+        scenario.dither.waveform = waveform;
+        plan.validate(&scenario)?;
+        Ok((scenario, plan))
     }
 
     fn write(&self, scenario: &Scenario<f64>, analyses: &[Analysis]) -> anyhow::Result<()> {
@@ -294,6 +302,11 @@ fn show(analysis: &Analysis) {
         analysis.checks.len(),
         coexist.count()
     );
+    if analysis.entries[0].amplitude_v > 0.0 {
+        println!(
+            "  WARNING: the first speed needs dither already, and the table has none below it; begin lower"
+        );
+    }
     for cell in failed {
         println!(
             "  FAILED at {} rpm, {:.4} V: {} from the given start, {} from the mirrored one",

@@ -70,6 +70,18 @@ impl Analysis {
     }
 }
 
+impl Plan {
+    /// Checks that the scenario can be run at every speed and at every amplitude of the plan.
+    ///
+    /// # Errors
+    /// If it cannot, or has no waveform.
+    pub fn validate(&self, scenario: &Scenario<f64>) -> Result<(), SweepError> {
+        scenarios(scenario, Parameter::Amplitude, &self.amplitudes_v)?;
+        scenarios(scenario, Parameter::Speed, &self.speeds_rpm)?;
+        Ok(())
+    }
+}
+
 /// How many runs [`schedule`] makes at least; bisections come on top.
 pub fn runs(plan: &Plan) -> usize {
     2 * plan.speeds_rpm.count() * (plan.amplitudes_v.count() + 2)
@@ -88,8 +100,7 @@ pub fn schedule(
     plan: &Plan,
     watch: Watch,
 ) -> Result<Option<Analysis>, SweepError> {
-    scenarios(scenario, Parameter::Amplitude, &plan.amplitudes_v)?;
-    scenarios(scenario, Parameter::Speed, &plan.speeds_rpm)?;
+    plan.validate(scenario)?;
     let Some(columns) = columns(scenario, plan, watch)? else {
         return Ok(None);
     };

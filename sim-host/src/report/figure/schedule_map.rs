@@ -41,15 +41,16 @@ fn shade(class: Class) -> RGBColor {
 /// # Errors
 /// If the drawing library fails.
 pub fn draw(analyses: &[Analysis]) -> anyhow::Result<String> {
-    let heading =
-        "Motion over wheel speed and dither amplitude (the worse of both starts), and the schedule";
+    let heading = "Motion over wheel speed and dither amplitude, and the schedule";
     let height = stack_height(analyses.len(), PANEL_HEIGHT);
     figure(heading, &legend(analyses), height, |area| {
         let rows = stack(area, analyses.len(), PANEL_HEIGHT, "wheel speed (rpm)");
         for (analysis, (row, name)) in analyses.iter().zip(rows) {
             let caption = match analysis.waveform {
-                Waveform::Sine => "sine",
-                Waveform::Square | Waveform::None => "square wave",
+                Waveform::Sine => "sine: the worse of the motions from both starts",
+                Waveform::Square | Waveform::None => {
+                    "square wave: the worse of the motions from both starts"
+                }
             };
             let (x, y) = axes(analysis, name);
             let panel = Panel::new(&row, (caption, ""), x, y)?;
