@@ -11,7 +11,6 @@ use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::SystemHandler;
 use shared_model::ecu::Ecu;
 use shared_model::open_loop::OpenLoop;
-use shared_model::schedule::Schedule;
 use shared_model::{InvalidScenario, Scenario};
 
 /// The watchdog bites when no model step arrives for this many of its periods, or for this long, ms, if that is longer.
@@ -58,8 +57,7 @@ fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>) -> ExitCode {
 
 /// The ECU steers a vehicle on the other end of the link.
 fn steer(scenario: &Scenario<f32>, link: &str) -> ExitCode {
-    let schedule = Schedule::constant(0.1);
-    let ecu = match Ecu::new(scenario, schedule, Current::COST_CLOCK_HZ) {
+    let ecu = match Ecu::new(scenario, Current::COST_CLOCK_HZ) {
         Ok(ecu) => ecu,
         Err(error) => return refuse_scenario(&error),
     };

@@ -4,7 +4,7 @@
 use crate::Real;
 use crate::parameter::{Field, ParameterSet};
 use crate::scenario::Scenario;
-use crate::schedule::Schedule;
+use crate::schedule::Table;
 use crate::signal::Measurement;
 
 /// When the dither is on, and how fast commands may move.
@@ -16,7 +16,7 @@ pub struct Policy<T> {
     pub dither_off_below_rpm: T,
     /// The dither comes on again this much above that speed, rpm.
     pub hysteresis_rpm: T,
-    /// Time in which the dither comes in and goes out, s.
+    /// Time in which the schedule's greatest amplitude comes in and goes out, s.
     pub dither_ramp_s: T,
     /// Greatest motor current that a request gets, A.
     pub motor_current_a: T,
@@ -28,7 +28,7 @@ impl<T: Real> Policy<T> {
     /// The policy for the preset `reconstruction`.
     pub fn reconstruction() -> Self {
         Self {
-            dither_off_below_rpm: T::from_f64(1200.0),
+            dither_off_below_rpm: T::from_f64(1530.0),
             hysteresis_rpm: T::from_f64(20.0),
             dither_ramp_s: T::from_f64(0.5),
             motor_current_a: T::from_f64(14.0),
@@ -97,20 +97,22 @@ pub struct Command<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Controller<T> {
     policy: Policy<T>,
-    schedule: Schedule<T>,
+    schedule: Table<T>,
     winding_resistance_ohm: T,
     period_s: T,
     ticks_to_dither: u32,
     dither_on: bool,
-    /// Share of the scheduled amplitude that is on, 0 to 1.
-    ramp: T,
+    amplitude_v: T,
+    /// Greatest change of the amplitude in a control tick, V.
+    amplitude_step_v: T,
     motor_current_a: T,
 }
 
 impl<T: Real> Controller<T> {
-    /// The controller of a scenario, with the schedule of its dither.
-    pub fn new(scenario: &Scenario<T>, schedule: Schedule<T>) -> Self {
+    /// The controller of a scenario.
+    pub fn new(scenario: &Scenario<T>) -> Self {
         let rate_hz = scenario.run.control_rate_hz;
+        let schedule = Table::of(scenario.dither.waveform);
         Self {
             policy: scenario.policy,
             schedule,
@@ -118,7 +120,8 @@ impl<T: Real> Controller<T> {
             period_s: T::one() / rate_hz,
             ticks_to_dither: (scenario.dither.start_time_s * rate_hz + T::from_f64(0.5)).to_u32(),
             dither_on: false,
-            ramp: T::zero(),
+            amplitude_v: T::zero(),
+            amplitude_step_v: schedule.peak_v() / (scenario.policy.dither_ramp_s * rate_hz),
             motor_current_a: T::zero(),
         }
     }
@@ -127,9 +130,12 @@ impl<T: Real> Controller<T> {
     pub fn run(&mut self, measurement: &Measurement<T>) -> Command<T> {
         let speed_rpm = measurement.wheel_speed_rpm;
         self.switch_dither(speed_rpm);
-        let step = self.period_s / self.policy.dither_ramp_s;
-        let target = if self.dither_on { T::one() } else { T::zero() };
-        self.ramp = towards(self.ramp, target, step);
+        let wanted_v = if self.dither_on {
+            self.schedule.amplitude_v(speed_rpm)
+        } else {
+            T::zero()
+        };
+        self.amplitude_v = towards(self.amplitude_v, wanted_v, self.amplitude_step_v);
 
         let limit = self.policy.motor_current_a;
         let request = limited(measurement.current_request_a, limit);
@@ -137,7 +143,7 @@ impl<T: Real> Controller<T> {
         self.motor_current_a = towards(self.motor_current_a, request, slew);
         Command {
             motor_v: self.motor_current_a * self.winding_resistance_ohm,
-            dither_amplitude_v: self.ramp * self.schedule.amplitude_v(speed_rpm),
+            dither_amplitude_v: self.amplitude_v,
         }
     }
 

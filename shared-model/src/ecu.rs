@@ -16,7 +16,6 @@ pub use control::{ControlInput, ControlOutput, ControlTask, Warning};
 pub use pwm::{PwmPeriod, PwmTask};
 
 use crate::exchange::{FrameBytes, Packet};
-use crate::schedule::Schedule;
 use crate::{InvalidScenario, Real, Scenario};
 
 /// The whole program, its tasks run in turn.
@@ -32,20 +31,15 @@ pub struct Ecu<T> {
 }
 
 impl<T: Real> Ecu<T> {
-    /// The program of a scenario, with the schedule of its dither's amplitude; its independent clock counts `clock_hz` a
-    /// second.
+    /// The program of a scenario; its independent clock counts `clock_hz` a second.
     ///
     /// # Errors
     /// If the scenario is not valid.
-    pub fn new(
-        scenario: &Scenario<T>,
-        schedule: Schedule<T>,
-        clock_hz: u32,
-    ) -> Result<Self, InvalidScenario> {
+    pub fn new(scenario: &Scenario<T>, clock_hz: u32) -> Result<Self, InvalidScenario> {
         scenario.validate()?;
         Ok(Self {
             pwm: PwmTask::new(scenario),
-            control: ControlTask::new(scenario, schedule, clock_hz),
+            control: ControlTask::new(scenario, clock_hz),
             output: None,
             frame: None,
         })

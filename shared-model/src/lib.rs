@@ -19,6 +19,7 @@ pub mod parameter;
 pub mod real;
 pub mod scenario;
 pub mod schedule;
+pub mod schedule_table;
 pub mod serial;
 pub mod servo;
 pub mod settings;

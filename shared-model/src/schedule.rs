@@ -1,21 +1,98 @@
-//! placeholder until merged
+//! The dither's schedule: which amplitude suppresses the chaos at which wheel speed.
+//!
+//! The ECU carries one for each waveform, [`crate::schedule_table`], made by `sim-host schedule`.
+
 use crate::Real;
-/// placeholder
+use crate::dither::Waveform;
+use crate::schedule_table::{POINTS, SINE, SQUARE};
+
+/// Amplitudes of one waveform at equally spaced wheel speeds. Small and `Copy`: each channel of the ECU holds its own in RAM.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Schedule<T> {
-    a: T,
+pub struct Schedule<T, const POINTS: usize> {
+    /// First wheel speed, rpm. Below it the dither is off.
+    pub first_rpm: T,
+    /// From one wheel speed to the next, rpm; greater than 0.
+    pub step_rpm: T,
+    /// Amplitude W at each wheel speed, V; 0 where the motion needs no dither.
+    pub amplitudes_v: [T; POINTS],
 }
-impl<T: Real> Schedule<T> {
-    /// p
-    pub fn none() -> Self {
-        Self { a: T::zero() }
+
+/// A schedule of the size that the ECU carries.
+pub type Table<T> = Schedule<T, POINTS>;
+
+impl<T: Real> Table<T> {
+    /// The ECU's schedule for a waveform; without one all amplitudes are 0.
+    pub fn of(waveform: Waveform) -> Self {
+        let table = match waveform {
+            Waveform::None => Schedule {
+                amplitudes_v: [0.0; POINTS],
+                ..SQUARE
+            },
+            Waveform::Square => SQUARE,
+            Waveform::Sine => SINE,
+        };
+        table.map(&|value| T::from_f64(value.into()))
     }
-    /// p
-    pub fn constant(a: f64) -> Self {
-        Self { a: T::from_f64(a) }
+}
+
+impl<T: Real, const POINTS: usize> Schedule<T, POINTS> {
+    /// Greatest amplitude, V.
+    pub fn peak_v(&self) -> T {
+        let larger = |a: T, b: &T| if *b > a { *b } else { a };
+        self.amplitudes_v.iter().fold(T::zero(), larger)
     }
-    /// p
-    pub fn amplitude_v(&self, _speed_rpm: T) -> T {
-        self.a
+
+    /// Amplitude for a wheel speed, V; see [`amplitude_v`].
+    ///
+    /// ```
+    /// use shared_model::schedule::Schedule;
+    /// let schedule = Schedule { first_rpm: 1500.0_f32, step_rpm: 50.0, amplitudes_v: [0.0, 0.1, 0.12] };
+    /// assert_eq!(schedule.amplitude_v(1499.9), 0.0); // below the first: off
+    /// assert_eq!(schedule.amplitude_v(1510.0), 0.1); // the larger of its two neighbours
+    /// assert_eq!(schedule.amplitude_v(1900.0), 0.12); // above the last: the last
+    /// ```
+    pub fn amplitude_v(&self, wheel_speed_rpm: T) -> T {
+        let Self {
+            first_rpm,
+            step_rpm,
+            amplitudes_v,
+        } = self;
+        amplitude_v(*first_rpm, *step_rpm, amplitudes_v, wheel_speed_rpm)
     }
+
+    /// The same schedule in another arithmetic.
+    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Schedule<U, POINTS> {
+        Schedule {
+            first_rpm: f(self.first_rpm),
+            step_rpm: f(self.step_rpm),
+            amplitudes_v: self.amplitudes_v.map(f),
+        }
+    }
+}
+
+/// Amplitude for a wheel speed, V, from amplitudes at equally spaced wheel speeds: the larger of its two neighbours'.
+///
+/// Not interpolated: between a speed that needs no dither and one that does, a part of the least amplitude would be no
+/// suppression at all, and weak dither can turn period one into chaos. In steps, only amplitudes are used that were found
+/// good at the speeds on both sides.
+///
+/// Below the first speed 0: the motion is at rest or of period one. Above the last the last amplitude, as dither that is
+/// turned off just where the chaos is worst would be the greater harm; how fast the vehicle may go is not decided here.
+/// A speed that is NaN or infinite gives 0. Amplitudes are handed out unchecked.
+pub fn amplitude_v<T: Real>(
+    first_rpm: T,
+    step_rpm: T,
+    amplitudes_v: &[T],
+    wheel_speed_rpm: T,
+) -> T {
+    let place = (wheel_speed_rpm - first_rpm) / step_rpm;
+    // Written so that NaN is off.
+    if !(place >= T::zero() && wheel_speed_rpm.is_finite()) {
+        return T::zero();
+    }
+    let below = place.to_u32() as usize;
+    let at = |k: usize| amplitudes_v.get(k).or(amplitudes_v.last()).copied();
+    let (lower, upper) = (at(below), at(below.saturating_add(1)));
+    let (lower, upper) = (lower.unwrap_or(T::zero()), upper.unwrap_or(T::zero()));
+    if upper > lower { upper } else { lower }
 }

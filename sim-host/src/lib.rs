@@ -9,6 +9,7 @@
 //! | what of the dither can an actuator produce? | [`realisability`] |
 //! | is a motion chaotic, or which period has it? | [`chaos`] |
 //! | where does averaging the dither start to hold? | [`averaging`] |
+//! | which amplitude suppresses the chaos at which speed? | [`schedule`] |
 //! | how good is the fixed step? | [`convergence`], [`engine::reference`] |
 //! | how does the vehicle move under the ECU's duty, and what do its sensors tell? | [`closed_loop`] |
 //! | how is the firmware run? | [`pil`] |
@@ -32,6 +33,7 @@ pub mod pil;
 pub mod realisability;
 pub mod report;
 pub mod reproduce;
+pub mod schedule;
 pub mod simulate;
 pub mod trace;
 pub mod verdict;

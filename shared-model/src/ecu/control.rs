@@ -8,7 +8,6 @@ use crate::frame::{
     ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_measurement, encode_actuation,
 };
 use crate::gate::{Fault, Faults, Observation, Setpoint, Supervisor};
-use crate::schedule::Schedule;
 use crate::signal::{Actuation, Measurement};
 use crate::{Real, Scenario};
 
@@ -125,13 +124,13 @@ pub struct ControlTask<T> {
 }
 
 impl<T: Real> ControlTask<T> {
-    pub(super) fn new(scenario: &Scenario<T>, schedule: Schedule<T>, clock_hz: u32) -> Self {
+    pub(super) fn new(scenario: &Scenario<T>, clock_hz: u32) -> Self {
         Self {
             channels: Duplex::new(Channel {
                 receiver: Receiver::new(SENSOR_DATA_ID, MAX_DELTA_COUNTER),
                 counter: u8::MAX,
                 measurement: None,
-                controller: Controller::new(scenario, schedule),
+                controller: Controller::new(scenario),
                 supervisor: Supervisor::new(scenario, clock_hz),
             }),
             sender: Sender::new(ACTUATOR_DATA_ID),

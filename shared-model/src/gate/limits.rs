@@ -27,7 +27,7 @@ pub struct Limits<T> {
     pub safe_wheel_speed_rpm: T,
     /// Greatest wheel speed, rpm; the least is zero.
     pub wheel_speed_rpm: T,
-    /// Greatest change of the wheel speed, rpm/s.
+    /// Greatest change of the wheel speed, rpm/s. As all changes, between two measurements, with their noise.
     pub wheel_acceleration_rpm_per_s: T,
     /// Greatest magnitude of the yaw rate, rad/s.
     pub yaw_rate_rad_per_s: T,
@@ -35,7 +35,9 @@ pub struct Limits<T> {
     pub yaw_acceleration_rad_per_s2: T,
     /// Greatest magnitude of the steering angle, rad.
     pub steering_angle_rad: T,
-    /// Greatest magnitude of the steering rate, rad/s, and so of the angle's change.
+    /// Greatest change of the steering angle, rad/s.
+    pub steering_angle_change_rad_per_s: T,
+    /// Greatest magnitude of the steering rate, rad/s.
     pub steering_rate_rad_per_s: T,
     /// Greatest change of the steering rate, rad/s^2.
     pub steering_acceleration_rad_per_s2: T,
@@ -69,10 +71,11 @@ impl<T: Real> Limits<T> {
             ramp_out_s: number(0.1),
             safe_wheel_speed_rpm: number(1100.0),
             wheel_speed_rpm: number(2500.0),
-            wheel_acceleration_rpm_per_s: number(1000.0),
+            wheel_acceleration_rpm_per_s: number(20_000.0),
             yaw_rate_rad_per_s: number(4.0),
             yaw_acceleration_rad_per_s2: number(200.0),
             steering_angle_rad: number(1.1),
+            steering_angle_change_rad_per_s: number(20.0),
             steering_rate_rad_per_s: number(4.0),
             steering_acceleration_rad_per_s2: number(200.0),
             current_request_a: number(20.0),
@@ -101,6 +104,7 @@ impl<T: Real> Limits<T> {
             yaw_rate_rad_per_s: f(self.yaw_rate_rad_per_s),
             yaw_acceleration_rad_per_s2: f(self.yaw_acceleration_rad_per_s2),
             steering_angle_rad: f(self.steering_angle_rad),
+            steering_angle_change_rad_per_s: f(self.steering_angle_change_rad_per_s),
             steering_rate_rad_per_s: f(self.steering_rate_rad_per_s),
             steering_acceleration_rad_per_s2: f(self.steering_acceleration_rad_per_s2),
             current_request_a: f(self.current_request_a),
@@ -142,6 +146,7 @@ impl<T: Real> ParameterSet<T> for Limits<T> {
         yaw_rate_rad_per_s: 1e-3..100.0,
         yaw_acceleration_rad_per_s2: 1e-3..1e5,
         steering_angle_rad: 1e-3..10.0,
+        steering_angle_change_rad_per_s: 1e-3..1e5,
         steering_rate_rad_per_s: 1e-3..1000.0,
         steering_acceleration_rad_per_s2: 1e-3..1e6,
         current_request_a: 0.0..1000.0,

@@ -82,7 +82,7 @@ impl<T: Real> Plausibility<T> {
         ) && is_slow(
             last.steering_angle_rad,
             now.steering_angle_rad,
-            limits.steering_rate_rad_per_s,
+            limits.steering_angle_change_rad_per_s,
         ) && is_slow(
             last.steering_rate_rad_per_s,
             now.steering_rate_rad_per_s,

@@ -16,6 +16,7 @@ mod qemu;
 mod realisability;
 mod regions;
 mod reproduce;
+mod schedule;
 mod settled;
 mod simulate;
 mod spectrum;
@@ -66,6 +67,7 @@ enum Command {
     Spectrum(spectrum::Arguments),
     Tires(tires::Arguments),
     Nonlinearity(nonlinearity::Arguments),
+    Schedule(schedule::Arguments),
     Realisability(realisability::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
@@ -110,6 +112,7 @@ pub fn main() -> ExitCode {
         Command::Spectrum(arguments) => spectrum::run(&arguments),
         Command::Tires(arguments) => tires::run(&arguments),
         Command::Nonlinearity(arguments) => nonlinearity::run(&arguments),
+        Command::Schedule(arguments) => schedule::run(&arguments),
         Command::Realisability(arguments) => realisability::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),

@@ -3,7 +3,6 @@
 use crate::pil::qemu::RunError;
 use crate::pil::session::Session;
 use shared_model::exchange::{Packet, ToEcu};
-use shared_model::schedule::Schedule;
 use shared_model::{InvalidScenario, Scenario, ecu};
 
 /// An ECU in the loop.
@@ -30,9 +29,9 @@ impl Software {
     ///
     /// # Errors
     /// If the scenario is not valid.
-    pub fn new(scenario: &Scenario<f32>, schedule: Schedule<f32>) -> Result<Self, InvalidScenario> {
+    pub fn new(scenario: &Scenario<f32>) -> Result<Self, InvalidScenario> {
         Ok(Self {
-            ecu: ecu::Ecu::new(scenario, schedule, CLOCK_HZ)?,
+            ecu: ecu::Ecu::new(scenario, CLOCK_HZ)?,
             counts_a_tick: (CLOCK_HZ as f32 / scenario.run.control_rate_hz) as u32,
         })
     }

@@ -10,6 +10,8 @@ mod sample;
 pub mod terminal;
 mod text;
 
+pub use figure::schedule_map::draw as schedule_map;
+
 use crate::trace::Trace;
 use crate::verdict::Verdict;
 use anyhow::{Context, ensure};

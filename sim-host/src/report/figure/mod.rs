@@ -8,6 +8,7 @@ pub(super) mod panel;
 mod phase_portrait;
 mod pwm_trace;
 pub(super) mod reduce;
+pub(super) mod schedule_map;
 pub(super) mod style;
 mod time_response;
 

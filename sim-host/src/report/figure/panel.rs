@@ -224,7 +224,7 @@ impl<'a> Panel<'a> {
     }
 
     /// A filled rectangle between two points, cut at the horizontal axis' ends.
-    fn block(&self, from: Point, to: Point, colour: RGBColor) -> anyhow::Result<()> {
+    pub fn block(&self, from: Point, to: Point, colour: RGBColor) -> anyhow::Result<()> {
         let (left, right) = (from.0.max(self.x.low), to.0.min(self.x.high));
         if left <= right {
             let area = self.chart.plotting_area();

@@ -99,6 +99,8 @@ pub enum Sample {
     Dot(Line),
     /// A piece of shaded band.
     Band,
+    /// A piece of an area of this colour.
+    Shade(RGBColor),
 }
 
 /// Text of the given height and colour, placed by its left end and middle height.
@@ -187,13 +189,17 @@ fn legend_entry(
             let style = ShapeStyle::from(line).filled();
             area.draw(&Circle::new((x + SAMPLE_WIDTH - 12, y), 5, style))?;
         }
-        Sample::Band => {
-            let corners = [(x, y - 12), (x + SAMPLE_WIDTH, y + 12)];
-            area.draw(&Rectangle::new(corners, BAND.filled()))?;
-        }
+        Sample::Band => shade(area, (x, y), BAND)?,
+        Sample::Shade(colour) => shade(area, (x, y), colour)?,
     }
     let style = text(TEXT_FONT, INK);
     area.draw_text(label, &style, (x + SAMPLE_WIDTH + 12, y))?;
+    Ok(())
+}
+
+fn shade(area: &Area, (x, y): (i32, i32), colour: RGBColor) -> anyhow::Result<()> {
+    let corners = [(x, y - 12), (x + SAMPLE_WIDTH, y + 12)];
+    area.draw(&Rectangle::new(corners, colour.filled()))?;
     Ok(())
 }
 

@@ -1,0 +1,316 @@
+//! `sim-host schedule`: the amplitude of dither that each wheel speed needs, as the table that the ECU carries.
+
+use super::output::{Output, check_free};
+use super::sweep::with_progress;
+use super::{ConfigOptions, Done};
+use anyhow::{bail, ensure};
+use serde::Serialize;
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use sim_host::chaos::sweep::{Timing, Values};
+use sim_host::config::{differences, validate};
+use sim_host::report::schedule_map;
+use sim_host::schedule::choose::Choice;
+use sim_host::schedule::map::Cell;
+use sim_host::schedule::{Analysis, Plan, runs, schedule, table};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The dither amplitude W that each wheel speed N needs, for square wave and sine: the table that the ECU carries.
+///
+/// At each speed the amplitude is scanned upwards from 0, from the scenario's start and from the mirrored one. Where the
+/// undithered motion from both is at rest or of period one, the entry is 0. Elsewhere it is the least amplitude of the first
+/// range that gives period one (one start may end at rest) at that speed and no worse at its neighbours, plus a margin. The
+/// map uses the mean of the dither; the entries are then checked with the true signal at the PWM rate, at the table's speeds
+/// and midway. About a minute and a half on 2 cores. Exit code 1 if a speed has no such amplitude or a check fails.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host schedule --figure schedule.svg --csv map.csv
+  sim-host schedule --config heavier.toml --from 1400 --step 50 --margin 0.5 --json schedule.json
+  sim-host schedule --out shared-model/src/schedule_table.rs --force       the table of the ECU, then build the firmware")]
+pub struct Arguments {
+    #[command(flatten)]
+    config: ConfigOptions,
+    /// First wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 1000.0,
+        allow_negative_numbers = true
+    )]
+    from: f64,
+    /// Last wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 2000.0,
+        allow_negative_numbers = true
+    )]
+    to: f64,
+    /// Step of the wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 25.0,
+        allow_negative_numbers = true
+    )]
+    step: f64,
+    /// Greatest amplitude of the square wave, V
+    #[arg(
+        long,
+        value_name = "VOLTS",
+        default_value_t = 0.15,
+        allow_negative_numbers = true
+    )]
+    square_to: f64,
+    /// Greatest amplitude of the sine, V
+    #[arg(
+        long,
+        value_name = "VOLTS",
+        default_value_t = 1.35,
+        allow_negative_numbers = true
+    )]
+    sine_to: f64,
+    /// Steps from 0 to the greatest amplitude; edges are bisected to a sixteenth of a step
+    #[arg(long, value_name = "COUNT", default_value_t = 30, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    amplitudes: u32,
+    /// How far above the least amplitude an entry lies, as a share of its range from 0 to 1; at least half a PWM count
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = 0.25,
+        allow_negative_numbers = true
+    )]
+    margin: f64,
+    /// What of each run is not looked at, s
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 150.0,
+        allow_negative_numbers = true
+    )]
+    transient: f64,
+    /// Length of each run, s
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 200.0,
+        allow_negative_numbers = true
+    )]
+    time: f64,
+    /// Write the table as Rust source, the module `shared_model::schedule_table`
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the map's cells as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+    /// Write map, entries and checks as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw the map with the schedule as an SVG figure
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+    /// Overwrite files that exist
+    #[arg(long)]
+    force: bool,
+}
+
+/// An edge is bisected to this share of the step between amplitudes.
+const EDGE_SHARE: f64 = 1.0 / 16.0;
+
+#[derive(Serialize)]
+struct Results<'a> {
+    margin: f64,
+    timing: Timing,
+    schedules: &'a [Analysis],
+}
+
+/// A row of the CSV.
+#[derive(Serialize)]
+struct Row {
+    waveform: Waveform,
+    wheel_speed_rpm: f64,
+    dither_amplitude_v: f64,
+    class: &'static str,
+    kind_from_given_start: String,
+    kind_from_mirrored_start: String,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let scenario = arguments.config.load()?;
+    validate(&scenario)?;
+    let plans = [
+        arguments.plan(&scenario, Waveform::Square)?,
+        arguments.plan(&scenario, Waveform::Sine)?,
+    ];
+    let files = [
+        &arguments.out,
+        &arguments.csv,
+        &arguments.json,
+        &arguments.figure,
+    ];
+    for path in files.into_iter().flatten() {
+        check_free(path, arguments.force)?;
+    }
+    let mut analyses = Vec::new();
+    for (scenario, plan) in plans {
+        let made = with_progress(runs(&plan) / 2, |watch| schedule(&scenario, &plan, watch))?;
+        let Some(analysis) = made else {
+            bail!("interrupted: a schedule needs all of its runs; no file was written");
+        };
+        analyses.push(analysis);
+    }
+    arguments.write(&scenario, &analyses)?;
+    analyses.iter().for_each(show);
+    let good = |a: &Analysis| a.hopeless_rpm().is_empty() && a.failed_checks().next().is_none();
+    Ok(if analyses.iter().all(good) {
+        Done::Well
+    } else {
+        Done::Failed
+    })
+}
+
+impl Arguments {
+    /// The scenario with this waveform and its plan, checked.
+    fn plan(
+        &self,
+        scenario: &Scenario<f64>,
+        waveform: Waveform,
+    ) -> anyhow::Result<(Scenario<f64>, Plan)> {
+        ensure!(
+            (0.0..=1.0).contains(&self.margin),
+            "--margin {}: must be a share from 0 to 1",
+            self.margin
+        );
+        let (what, to_v) = match waveform {
+            Waveform::Sine => ("amplitude of the sine (V)", self.sine_to),
+            Waveform::Square | Waveform::None => {
+                ("amplitude of the square wave (V)", self.square_to)
+            }
+        };
+        let step_v = to_v / f64::from(self.amplitudes);
+        let plan = Plan {
+            speeds_rpm: Values::new("wheel speed (rpm)", self.from, self.to, self.step)?,
+            amplitudes_v: Values::new(what, 0.0, to_v, step_v)?,
+            edge_width_v: EDGE_SHARE * step_v,
+            margin: self.margin,
+            timing: Timing::new(self.transient, self.time)?,
+        };
+        let mut scenario = *scenario;
+        scenario.dither.waveform = waveform;
+        plan.validate(&scenario)?;
+        Ok((scenario, plan))
+    }
+
+    fn write(&self, scenario: &Scenario<f64>, analyses: &[Analysis]) -> anyhow::Result<()> {
+        if let Some(path) = &self.out {
+            self.text(path, &table::source(analyses, &self.made_by(scenario)))?;
+        }
+        if let Some(path) = &self.csv {
+            let mut output = Output::create(path, self.force)?;
+            let mut csv = csv::Writer::from_writer(output.writer());
+            for row in analyses.iter().flat_map(rows) {
+                csv.serialize(row)?;
+            }
+            csv.flush()?;
+            drop(csv);
+            output.finish()?;
+        }
+        if let Some(path) = &self.json {
+            let results = Results {
+                margin: self.margin,
+                timing: Timing::new(self.transient, self.time)?,
+                schedules: analyses,
+            };
+            self.text(path, &(serde_json::to_string_pretty(&results)? + "\n"))?;
+        }
+        if let Some(path) = &self.figure {
+            self.text(path, &schedule_map(analyses)?)?;
+        }
+        Ok(())
+    }
+
+    fn text(&self, path: &Path, text: &str) -> anyhow::Result<()> {
+        let mut output = Output::create(path, self.force)?;
+        output.writer().write_all(text.as_bytes())?;
+        output.finish()
+    }
+
+    /// The command, and what it was run on.
+    fn made_by(&self, scenario: &Scenario<f64>) -> Vec<String> {
+        let differences = differences(scenario);
+        let parameters = match &differences[..] {
+            [] => "the paper's (preset `reconstruction`)".to_owned(),
+            _ => format!("the paper's but for {}", differences.join(", ")),
+        };
+        vec![
+            format!(
+                "Made by `sim-host schedule --from {} --to {} --step {} --square-to {} --sine-to {} --amplitudes {}",
+                self.from, self.to, self.step, self.square_to, self.sine_to, self.amplitudes
+            ),
+            format!(
+                "--margin {} --transient {} --time {} --out FILE`; not to be edited by hand. Parameters: {parameters}.",
+                self.margin, self.transient, self.time
+            ),
+        ]
+    }
+}
+
+fn rows(analysis: &Analysis) -> impl Iterator<Item = Row> + '_ {
+    let cells = analysis.columns.iter().flat_map(|column| &column.cells);
+    cells.map(|cell| Row {
+        waveform: analysis.waveform,
+        wheel_speed_rpm: cell.wheel_speed_rpm,
+        dither_amplitude_v: cell.amplitude_v,
+        class: cell.class().name(),
+        kind_from_given_start: cell.given.to_string(),
+        kind_from_mirrored_start: cell.mirrored.to_string(),
+    })
+}
+
+fn show(analysis: &Analysis) {
+    let word = match analysis.waveform {
+        Waveform::Sine => "sine",
+        Waveform::Square | Waveform::None => "square wave",
+    };
+    println!(
+        "{word} (a range ends within {:.1} mV beyond the ends given):",
+        1e3 * analysis.edge_width_v
+    );
+    for entry in &analysis.entries {
+        println!("  {:.4} V  {}", entry.amplitude_v, table::remark(entry));
+    }
+    let count = |choice| {
+        analysis
+            .entries
+            .iter()
+            .filter(|e| e.choice == choice)
+            .count()
+    };
+    println!(
+        "  speeds: {} need none, {} get period one, {} only rest, {} neither",
+        count(Choice::Undithered),
+        count(Choice::PeriodOne),
+        count(Choice::Rest),
+        count(Choice::Nothing)
+    );
+    let failed: Vec<&Cell> = analysis.failed_checks().collect();
+    let coexist = analysis.checks.iter().filter(|cell| cell.coexist());
+    println!(
+        "  checks with the true signal at the speeds and midway: {} of {} are calm; at {} of them a motion and an equilibrium coexist",
+        analysis.checks.len() - failed.len(),
+        analysis.checks.len(),
+        coexist.count()
+    );
+    if analysis.entries[0].amplitude_v > 0.0 {
+        println!(
+            "  WARNING: the first speed needs dither already, and the table has none below it; begin lower"
+        );
+    }
+    for cell in failed {
+        println!(
+            "  FAILED at {} rpm, {:.4} V: {} from the given start, {} from the mirrored one",
+            cell.wheel_speed_rpm, cell.amplitude_v, cell.given, cell.mirrored
+        );
+    }
+}

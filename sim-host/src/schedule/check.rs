@@ -1,0 +1,81 @@
+//! The schedule as the ECU uses it: looked up, and applied as the true signal at the PWM's rate.
+
+use super::choose::Entry;
+use super::map::{Cell, both, cell};
+use crate::chaos::attractor::Kind;
+use crate::chaos::period::{Period, RIPPLE_TOLERANCE, period};
+use crate::chaos::sweep::{SweepError, Timing, Values, Watch};
+use crate::simulate::{after_transient, record, settle, started_at};
+use crate::trace::is_bounded;
+use shared_model::Scenario;
+use shared_model::dither::Application;
+use shared_model::schedule::amplitude_v;
+use shared_model::vehicle::YAW_RATE;
+
+/// Time in which the motion settles under the dither, and in which it is looked at, s.
+const DITHER_TRANSIENT_S: f64 = 60.0;
+const MOTION_S: f64 = 40.0;
+/// Periods of the dither over which the motion is averaged: the ripple is gone, the slow motion is not touched.
+const SMOOTHED_PERIODS: f64 = 2.0;
+/// Less swing of the smoothed yaw rate is what the ripple leaves of rest, rad/s; cycles have some tenths.
+const AT_REST_RAD_PER_S: f64 = 1e-3;
+
+/// The motions under the amplitudes that the ECU looks up at the table's speeds and midway between them, by speed; `None`
+/// if it was stopped.
+///
+/// As the ECU meets them: the undithered motion settles from either start before the dither sets in.
+pub(super) fn check(
+    scenario: &Scenario<f64>,
+    speeds_rpm: &Values,
+    entries: &[Entry],
+    timing: Timing,
+    watch: Watch,
+) -> Result<Option<Vec<Cell>>, SweepError> {
+    let amplitudes_v: Vec<f64> = entries.iter().map(|entry| entry.amplitude_v).collect();
+    let speeds: Vec<f64> = speeds_rpm.iter().collect();
+    let first_rpm = speeds[0];
+    let step_rpm = speeds.get(1).map_or(1.0, |second| second - first_rpm);
+    let midway = speeds.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
+    let mut at: Vec<f64> = midway.chain(speeds.iter().copied()).collect();
+    at.sort_by(f64::total_cmp);
+    let checked = watch.points(&at, |&rpm| {
+        let mut scenario = *scenario;
+        scenario.run.wheel_speed_rpm = rpm;
+        scenario.dither.amplitude_v = amplitude_v(first_rpm, step_rpm, &amplitudes_v, rpm);
+        if scenario.dither.amplitude_v == 0.0 {
+            return cell(&scenario, timing);
+        }
+        both(&scenario, |scenario| under_signal(scenario, timing))
+    });
+    let checked = checked.into_iter().collect::<Option<Result<_, _>>>();
+    checked.transpose()
+}
+
+/// Kind of the motion when the true signal sets in on the settled undithered motion.
+fn under_signal(scenario: &Scenario<f64>, timing: Timing) -> Result<Kind, SweepError> {
+    let settled = settle(scenario, timing.transient_s)?;
+    if !is_bounded(&settled.x) {
+        return Ok(Kind::Diverges);
+    }
+    let mut scenario = started_at(scenario, &settled);
+    scenario.dither.application = Application::Signal;
+    scenario.run.duration_s = MOTION_S;
+    let trace = record(
+        &mut after_transient(&scenario, DITHER_TRANSIENT_S)?,
+        &scenario,
+    );
+    if trace.diverges_at_s().is_some() {
+        return Ok(Kind::Diverges);
+    }
+    let turn_s = std::f64::consts::TAU / scenario.dither.frequency_rad_per_s();
+    let slow = trace.smoothed(SMOOTHED_PERIODS * turn_s);
+    let (low, high) = slow.range(YAW_RATE, 0);
+    if high - low < AT_REST_RAD_PER_S {
+        return Ok(Kind::Equilibrium);
+    }
+    Ok(match period(&slow, 0, RIPPLE_TOLERANCE) {
+        Period::Equilibrium => Kind::Equilibrium,
+        Period::Periodic { maxima, .. } => Kind::Periodic(maxima),
+        Period::Aperiodic { .. } | Period::TooShort { .. } => Kind::Undecided,
+    })
+}
