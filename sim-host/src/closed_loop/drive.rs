@@ -111,6 +111,11 @@ impl Drive {
         self.lead_in_periods + self.plant.total_periods()
     }
 
+    /// The lead-in is over: the vehicle has moved.
+    pub fn has_begun(&self) -> bool {
+        self.periods > self.lead_in_periods
+    }
+
     /// What the ECU last told.
     pub fn actuation(&self) -> Option<&Actuation<f32>> {
         self.actuation.as_ref()

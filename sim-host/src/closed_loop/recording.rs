@@ -1,0 +1,128 @@
+//! A recorded run: all that passed between ECU and vehicle, with the scenario, to be replayed without an emulator.
+//!
+//! The file: a magic number, the ECU's scenario as TOML behind its length, the number of PWM periods, two packets a period,
+//! and a CRC-32 over everything before it. Numbers are little-endian.
+
+use super::ecu::{Ecu, Software};
+use super::run::Exchange;
+use shared_model::Scenario;
+use shared_model::exchange::{PACKET_LEN, Packet, PacketBytes};
+use std::io::Write;
+
+const MAGIC: &[u8; 8] = b"DSLOOP1\n";
+const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+const CHECKSUM_LEN: usize = 4;
+
+/// A recorded run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// The ECU's scenario.
+    pub scenario: Scenario<f32>,
+    /// What passed, one a PWM period.
+    pub exchanges: Vec<Exchange>,
+}
+
+/// Why a file is no recording.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordingError {
+    /// The file does not begin as one.
+    #[error("is no recording of the loop; `sim-host pil --record FILE` makes one")]
+    NoRecording,
+    /// A bit was changed, or the file is cut short.
+    #[error("is damaged or cut short: its check sum does not fit; record it again")]
+    Damaged,
+    /// The scenario in it cannot be read.
+    #[error("has a scenario that this version cannot read: {0}")]
+    Scenario(String),
+    /// The scenario in it is not valid.
+    #[error("has a scenario that cannot be run: {0}")]
+    Invalid(#[from] shared_model::InvalidScenario),
+}
+
+impl Recording {
+    /// Writes it.
+    ///
+    /// # Errors
+    /// If `writer` does not take it.
+    pub fn write(&self, writer: &mut impl Write) -> std::io::Result<()> {
+        let text = toml::to_string(&self.scenario).map_err(std::io::Error::other)?;
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend((text.len() as u32).to_le_bytes());
+        bytes.extend(text.as_bytes());
+        bytes.extend((self.exchanges.len() as u32).to_le_bytes());
+        for exchange in &self.exchanges {
+            bytes.extend(exchange.from_ecu.encode());
+            bytes.extend(exchange.to_ecu.encode());
+        }
+        bytes.extend(CHECKSUM.checksum(&bytes).to_le_bytes());
+        writer.write_all(&bytes)
+    }
+
+    /// Reads it back.
+    ///
+    /// # Errors
+    /// If the bytes are no recording, or damaged.
+    pub fn read(bytes: &[u8]) -> Result<Self, RecordingError> {
+        use RecordingError::{Damaged, NoRecording};
+        let body = bytes.strip_prefix(MAGIC).ok_or(NoRecording)?;
+        let (covered, stored) = bytes.split_last_chunk::<CHECKSUM_LEN>().ok_or(Damaged)?;
+        if CHECKSUM.checksum(covered) != u32::from_le_bytes(*stored) {
+            return Err(Damaged);
+        }
+        let (text, body) = take_sized(body).ok_or(Damaged)?;
+        let text = std::str::from_utf8(text).map_err(|_| Damaged)?;
+        let (count, body) = take_length(body).ok_or(Damaged)?;
+        let (periods, rest) = body.as_chunks::<{ 2 * PACKET_LEN }>();
+        if periods.len() != count || rest.len() != CHECKSUM_LEN {
+            return Err(Damaged);
+        }
+        let scenario = toml::from_str(text);
+        Ok(Self {
+            scenario: scenario.map_err(|error| RecordingError::Scenario(error.to_string()))?,
+            exchanges: periods.iter().map(exchange).collect(),
+        })
+    }
+
+    /// What the ECU's program on this host puts out when it is told what was recorded.
+    ///
+    /// # Errors
+    /// If the scenario is not valid.
+    pub fn replay(&self) -> Result<Vec<Exchange>, RecordingError> {
+        let mut ecu = Software::new(&self.scenario)?;
+        let mut replayed = Vec::with_capacity(self.exchanges.len());
+        for recorded in &self.exchanges {
+            let answer = &mut |from_ecu: &Packet| {
+                replayed.push(Exchange {
+                    from_ecu: *from_ecu,
+                    to_ecu: recorded.to_ecu,
+                });
+                recorded.to_ecu
+            };
+            ecu.period(answer)
+                .expect("a program on the host is always reached");
+        }
+        Ok(replayed)
+    }
+}
+
+fn take_length(bytes: &[u8]) -> Option<(usize, &[u8])> {
+    let (length, rest) = bytes.split_first_chunk()?;
+    Some((u32::from_le_bytes(*length) as usize, rest))
+}
+
+fn take_sized(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (length, rest) = take_length(bytes)?;
+    rest.split_at_checked(length)
+}
+
+fn exchange(bytes: &[u8; 2 * PACKET_LEN]) -> Exchange {
+    let packet = |half: &[u8]| {
+        let bytes: PacketBytes = half.try_into().expect("half of two packets");
+        Packet::decode(&bytes)
+    };
+    let (from_ecu, to_ecu) = bytes.split_at(PACKET_LEN);
+    Exchange {
+        from_ecu: packet(from_ecu),
+        to_ecu: packet(to_ecu),
+    }
+}
