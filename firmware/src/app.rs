@@ -32,6 +32,9 @@ pub fn run() -> ExitCode {
         Ok(ecu) => ecu,
         Err(error) => return refuse_scenario(&error),
     };
+    if command.scenario.servo.timer_clock_hz != Current::TIMER_CLOCK_HZ as f32 {
+        return refuse_timer_clock(command.scenario.servo.timer_clock_hz);
+    }
     defmt::info!(
         "run of {=f32} s at {=f32} rpm, {=f32} model steps a second",
         command.scenario.run.duration_s,
@@ -108,6 +111,15 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
     ExitCode::BadScenario
 }
 
+fn refuse_timer_clock(timer_clock_hz: f32) -> ExitCode {
+    defmt::error!(
+        "scenario refused: servo.timer_clock_hz = {=f32}: must be {=u32}, this board's",
+        timer_clock_hz,
+        Current::TIMER_CLOCK_HZ
+    );
+    ExitCode::BadScenario
+}
+
 fn record(
     scenario: &Scenario<f32>,
     ecu: OpenLoop<f32>,
@@ -156,8 +168,14 @@ fn start(
     critical_section::with(|_| {
         let period = task.neutral().period();
         // Started once and with a period that the scenario's check has passed.
-        if let Ok(pwm) = Current::start_pwm(period) {
-            tasks::hand_over(PwmInterrupt { task, pwm }, control, samples_a_ms);
+        let recording = recorder::take_duty_recording();
+        if let (Ok(pwm), Some(recording)) = (Current::start_pwm(period), recording) {
+            let interrupt = PwmInterrupt {
+                task,
+                pwm,
+                recording,
+            };
+            tasks::hand_over(interrupt, control, samples_a_ms);
         }
         set_priorities();
         Current::start_watchdog(timeout_ms.max(WATCHDOG_LEAST_MS));

@@ -1,5 +1,6 @@
 //! The scenario from the command line that the emulator was started with.
 
+use crate::board::{Board, Current};
 use cortex_m_semihosting::syscall1;
 use shared_model::Scenario;
 use shared_model::settings::SettingError;
@@ -10,6 +11,8 @@ const GET_COMMAND_LINE: usize = 0x15;
 const MAX_BYTES: usize = 4096;
 /// Key of the telemetry file's path, the one setting that is not of the scenario.
 const TELEMETRY: &str = "telemetry=";
+/// Key of a preset, which replaces the whole scenario.
+const PRESET: &str = "preset=";
 
 /// What the command line asks for.
 pub struct Command {
@@ -50,12 +53,18 @@ fn parse(text: &'static str) -> Result<Command, CommandError> {
         scenario: Scenario::reconstruction(),
         telemetry: None,
     };
+    let timer_clock_hz = Current::TIMER_CLOCK_HZ as f32;
+    command.scenario.servo.timer_clock_hz = timer_clock_hz;
     for word in text.split_ascii_whitespace().skip(1) {
         if let Some(path) = word.strip_prefix(TELEMETRY) {
             command.telemetry = Some(path);
         } else {
             let applied = command.scenario.apply(word);
             applied.map_err(|error| CommandError::Setting(word, error))?;
+        }
+        // A preset is one for any board.
+        if word.starts_with(PRESET) {
+            command.scenario.servo.timer_clock_hz = timer_clock_hz;
         }
     }
     Ok(command)

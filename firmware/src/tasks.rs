@@ -5,7 +5,7 @@
 //! at work. Nothing here can panic: the binary `panic-free` proves it at link time.
 
 use crate::board::{Board, Current};
-use crate::recorder::{RecordProducer, count_overrun};
+use crate::recorder::{DutyRecording, RecordProducer, count_overrun};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
@@ -33,6 +33,8 @@ pub struct PwmInterrupt {
     pub task: PwmTask<f32>,
     /// The servo's PWM.
     pub pwm: <Current as Board>::Pwm,
+    /// Where its duty codes go.
+    pub recording: DutyRecording,
 }
 
 /// What the control interrupt works on.
@@ -73,6 +75,7 @@ impl PwmInterrupt {
         if self.pwm.set_duty_cycle(sample.duty.code()).is_err() {
             count_overrun();
         }
+        self.recording.push(Current::pwm_output().0);
         SAMPLES.fetch_add(1, Ordering::Relaxed);
         DITHER_BITS.store(sample.dither.to_bits(), Ordering::Relaxed);
         if sample.control_due {

@@ -1,14 +1,11 @@
 //! Arm MPS2 with the AN386 (Cortex-M4F) or AN500 (Cortex-M7) image, as QEMU emulates them.
 //!
-//! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of RAM and records every code
-//! in a ring.
+//! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of RAM.
 
-use super::{Board, BoardError};
-use crate::recorder;
+use super::{Board, BoardError, systick};
 use core::convert::Infallible;
 use core::ptr::{read_volatile, write_volatile};
 use core::sync::atomic::{AtomicU16, Ordering};
-use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
 /// Clock of the core, SysTick and the APB timers, Hz.
@@ -40,7 +37,6 @@ pub struct Mps2;
 /// The virtual PWM.
 pub struct VirtualPwm {
     period: u16,
-    recording: recorder::DutyRecording,
 }
 
 impl ErrorType for VirtualPwm {
@@ -53,9 +49,7 @@ impl SetDutyCycle for VirtualPwm {
     }
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-        let duty = duty.min(self.period);
-        DUTY.store(duty, Ordering::Relaxed);
-        self.recording.push(duty);
+        DUTY.store(duty.min(self.period), Ordering::Relaxed);
         Ok(())
     }
 }
@@ -63,11 +57,11 @@ impl SetDutyCycle for VirtualPwm {
 impl Board for Mps2 {
     type Pwm = VirtualPwm;
 
+    const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
     const COST_CLOCK_HZ: u32 = CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = INSTRUCTION_RATE_HZ;
 
     fn start_pwm(period: u16) -> Result<VirtualPwm, BoardError> {
-        let recording = recorder::take_duty_recording().ok_or(BoardError)?;
         let mut core = cortex_m::Peripherals::take().ok_or(BoardError)?;
         PERIOD.store(period, Ordering::Relaxed);
         Self::neutralise_pwm();
@@ -78,17 +72,8 @@ impl Board for Mps2 {
             write_volatile(TIMER0_VALUE, u32::MAX);
             write_volatile(TIMER0_CTRL, 1);
         }
-        core.SYST.set_clock_source(SystClkSource::Core);
-        core.SYST.set_reload(u32::from(period) - 1);
-        core.SYST.clear_current();
-        core.SYST.enable_interrupt();
-        core.SYST.enable_counter();
-        Ok(VirtualPwm { period, recording })
-    }
-
-    fn stop_pwm_interrupt() {
-        // SAFETY: a write to one register of SysTick, which only this module uses.
-        unsafe { (*SYST::PTR).csr.write(0) };
+        systick::start(&mut core.SYST, period);
+        Ok(VirtualPwm { period })
     }
 
     fn neutralise_pwm() {
