@@ -6,6 +6,6 @@ pub mod gdb;
 pub mod log;
 pub mod qemu;
 pub mod qmp;
-mod socket;
 pub mod settings;
+mod socket;
 pub mod telemetry;

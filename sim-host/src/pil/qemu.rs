@@ -49,6 +49,14 @@ impl Machine {
         }
     }
 
+    /// The firmware's board whose images run on it.
+    pub fn board(self) -> &'static str {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => "mps2",
+            Self::NetduinoPlus2 => "netduinoplus2",
+        }
+    }
+
     /// Virtual time is counted in instructions, and idle time is skipped: the same run every time. An instruction takes 2^5
     /// ns; on the STM32F405 2^3 ns, because its timers run some ten times faster than the program believes.
     fn instruction_counting(self) -> &'static str {

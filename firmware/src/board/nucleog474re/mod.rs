@@ -50,7 +50,9 @@ impl Board for NucleoG474re {
         let (_, neutral) = Self::pwm_output();
         // SAFETY: writes to two registers of the timer, each of which is right at any time.
         let timer = unsafe { &*pac::TIM3::ptr() };
-        timer.ccr1().write(|w| unsafe { w.ccr().bits(neutral.into()) });
+        timer
+            .ccr1()
+            .write(|w| unsafe { w.ccr().bits(neutral.into()) });
         // Takes the duty over now, and not only when the period is over.
         timer.egr().write(|w| w.ug().set_bit());
     }
