@@ -1,5 +1,8 @@
 //! The same ECU on other boards: an STM32F405 whose timer is looked at from outside, and the images of all boards.
 
+// The emulator is steered over local sockets.
+#![cfg(unix)]
+
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;
@@ -140,6 +143,16 @@ fn core_registers_are_read_and_written() {
     run.gdb
         .remove_breakpoint(interrupt)
         .expect("the breakpoint was set");
+}
+
+#[test]
+fn the_end_of_the_program_is_a_stop() {
+    let mut scenario = scenario(Waveform::None);
+    scenario.run.wheel_speed_rpm = 0.0;
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let mut run = start(&scenario, folder.path());
+    let stop = run.gdb.run_to_stop(TIME_OUT).expect("the program ends");
+    assert_eq!(stop, Stop::Exited(BAD_SCENARIO as u8));
 }
 
 #[test]

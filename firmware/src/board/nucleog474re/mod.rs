@@ -32,14 +32,15 @@ impl Board for NucleoG474re {
         let pins = chip.GPIOA.split(&mut rcc);
 
         pac::TIM2::enable(&mut rcc);
+        // SAFETY: the register takes any value.
         chip.TIM2.arr().write(|w| unsafe { w.arr().bits(u32::MAX) });
         chip.TIM2.cr1().write(|w| w.cen().set_bit());
 
         let pin: PA6<AF2> = pins.pa6.into_alternate();
         let builder = chip.TIM3.pwm_advanced(pin, &mut rcc);
         let (_, mut pwm) = builder.period(period - 1).finalize();
-        pwm.enable();
         Self::neutralise_pwm();
+        pwm.enable();
         // Right behind the restart of the period, so that the interrupt writes a duty early in a period and it is taken over
         // at that period's end, never in doubt between two.
         systick::start(&mut core.SYST, period);
@@ -50,6 +51,7 @@ impl Board for NucleoG474re {
         let (_, neutral) = Self::pwm_output();
         // SAFETY: writes to two registers of the timer, each of which is right at any time.
         let timer = unsafe { &*pac::TIM3::ptr() };
+        // SAFETY: as above; the register takes any duty.
         timer
             .ccr1()
             .write(|w| unsafe { w.ccr().bits(neutral.into()) });
