@@ -2,11 +2,23 @@
 
 use std::{env, fs, path::PathBuf};
 
-const BOARD: &str = "mps2";
+/// What cargo puts in front of the name of a board whose feature is on.
+const BOARD_FEATURE: &str = "CARGO_FEATURE_BOARD_";
 
 fn main() {
+    let chosen = env::vars().filter_map(|(name, _)| {
+        let board = name.strip_prefix(BOARD_FEATURE)?;
+        Some(board.to_lowercase())
+    });
+    let chosen: Vec<String> = chosen.collect();
+    let [board] = chosen.as_slice() else {
+        println!(
+            "cargo::error=choose exactly one board, not {chosen:?}: `--no-default-features --features board-NAME`"
+        );
+        return;
+    };
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-    let map = format!("boards/{BOARD}/memory.x");
+    let map = format!("src/board/{board}/memory.x");
     fs::copy(&map, out.join("board-memory.x")).expect("the board's memory map is readable");
     println!("cargo:rerun-if-changed={map}");
     println!("cargo:rerun-if-changed=../memory.x");

@@ -28,6 +28,10 @@ pub fn run() -> ExitCode {
         Ok(command) => command,
         Err(error) => return refuse_command(&error),
     };
+    let timer_clock_hz = command.scenario.servo.timer_clock_hz;
+    if timer_clock_hz != Current::TIMER_CLOCK_HZ as f32 {
+        return refuse_timer_clock(timer_clock_hz);
+    }
     match command.link {
         Some(link) => steer(&command.scenario, link),
         None => simulate(&command.scenario, command.telemetry),
@@ -127,6 +131,15 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             bus_v
         ),
     }
+    ExitCode::BadScenario
+}
+
+fn refuse_timer_clock(timer_clock_hz: f32) -> ExitCode {
+    defmt::error!(
+        "scenario refused: servo.timer_clock_hz = {=f32}: must be {=u32}, this board's",
+        timer_clock_hz,
+        Current::TIMER_CLOCK_HZ
+    );
     ExitCode::BadScenario
 }
 

@@ -1,5 +1,6 @@
 //! The scenario from the command line that the emulator was started with.
 
+use crate::board::{Board, Current};
 use cortex_m_semihosting::syscall1;
 use shared_model::Scenario;
 use shared_model::settings::SettingError;
@@ -12,6 +13,8 @@ const MAX_BYTES: usize = 4096;
 const TELEMETRY: &str = "telemetry=";
 /// Key of the link's name.
 const LINK: &str = "link=";
+/// Key of a preset, which replaces the whole scenario.
+const PRESET: &str = "preset=";
 
 /// What the command line asks for.
 pub struct Command {
@@ -55,6 +58,8 @@ fn parse(text: &'static str) -> Result<Command, CommandError> {
         telemetry: None,
         link: None,
     };
+    let timer_clock_hz = Current::TIMER_CLOCK_HZ as f32;
+    command.scenario.servo.timer_clock_hz = timer_clock_hz;
     for word in text.split_ascii_whitespace().skip(1) {
         if let Some(path) = word.strip_prefix(TELEMETRY) {
             command.telemetry = Some(path);
@@ -63,6 +68,10 @@ fn parse(text: &'static str) -> Result<Command, CommandError> {
         } else {
             let applied = command.scenario.apply(word);
             applied.map_err(|error| CommandError::Setting(word, error))?;
+        }
+        // A preset is one for any board.
+        if word.starts_with(PRESET) {
+            command.scenario.servo.timer_clock_hz = timer_clock_hz;
         }
     }
     Ok(command)

@@ -57,7 +57,8 @@ impl PwmInterrupt {
         }
         let sent = ToHost {
             packet: Packet {
-                duty_code: period.duty.code(),
+                // As it is on the pin.
+                duty_code: Current::pwm_output().0,
                 frame: output.map(|output| output.frame),
             },
             pwm_cost: if period.control_due {

@@ -3,7 +3,7 @@
 use crate::board::{Board, Current};
 use crate::exit::ExitCode;
 use crate::host_file::HostFileError;
-use crate::recorder::{self, RecordProducer, Recorder, count_overrun};
+use crate::recorder::{self, DutyRecording, RecordProducer, Recorder, count_overrun};
 use crate::{app, tasks};
 use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_hal::pwm::SetDutyCycle;
@@ -20,6 +20,8 @@ pub struct PwmInterrupt {
     pub task: PwmTask<f32>,
     /// The servo's PWM.
     pub pwm: <Current as Board>::Pwm,
+    /// Where its duty codes go.
+    pub recording: DutyRecording,
 }
 
 /// What the control interrupt works on.
@@ -42,6 +44,7 @@ impl PwmInterrupt {
         if self.pwm.set_duty_cycle(sample.duty.code()).is_err() {
             count_overrun();
         }
+        self.recording.push(Current::pwm_output().0);
         DITHER_BITS.store(sample.dither.to_bits(), Ordering::Relaxed);
         if sample.control_due && !tasks::call_control() {
             count_overrun();
@@ -90,7 +93,9 @@ pub fn run(
         instruction_rate_hz: Current::INSTRUCTION_RATE_HZ,
         initial: *ecu.control.state(),
     };
-    let Some((mut recorder, records)) = Recorder::new(telemetry, &header)? else {
+    let rings = Recorder::new(telemetry, &header)?;
+    let (Some((mut recorder, records)), Some(recording)) = (rings, recorder::take_duty_recording())
+    else {
         return Ok(ExitCode::TelemetryFailed);
     };
     let control = ControlInterrupt {
@@ -103,7 +108,11 @@ pub fn run(
     let task = ecu.pwm;
     app::start(period, scenario, scenario.step_s(), |pwm| {
         (
-            tasks::PwmInterrupt::OpenLoop(PwmInterrupt { task, pwm }),
+            tasks::PwmInterrupt::OpenLoop(PwmInterrupt {
+                task,
+                pwm,
+                recording,
+            }),
             tasks::ControlInterrupt::OpenLoop(control),
         )
     });

@@ -34,7 +34,7 @@ pub fn overruns() -> u32 {
     OVERRUNS.load(Ordering::Relaxed)
 }
 
-/// Where a PWM that records puts its duty codes.
+/// Where the PWM interrupt puts the duty codes that the PWM holds.
 pub struct DutyRecording(Producer<'static, u16, DUTY_RING>);
 
 impl DutyRecording {

@@ -10,19 +10,33 @@ use std::time::Duration;
 
 /// Far more than any run of the tests takes.
 pub const TIME_OUT: Duration = Duration::from_secs(120);
+const USUAL_BOARD: &str = "mps2";
 /// File of a run's telemetry in its folder.
 pub const TELEMETRY: &str = "telemetry.bin";
 
-/// An image of the firmware.
+/// An image of the firmware for the usual board.
 ///
 /// # Panics
 /// If it is not built: a test that cannot run has not passed.
 pub fn image(name: &str) -> Image {
+    board_image(USUAL_BOARD, name)
+}
+
+/// An image of the firmware for a board.
+///
+/// # Panics
+/// If it is not built: a test that cannot run has not passed.
+pub fn board_image(board: &str, name: &str) -> Image {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
         .expect("the tests are in the workspace");
     let target =
         std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
+    // Every board but the usual one has a target folder of its own.
+    let target = match board {
+        USUAL_BOARD => target,
+        _ => target.join("boards").join(board),
+    };
     let path = target.join("thumbv7em-none-eabihf/firmware").join(name);
     Image::open(&path).unwrap_or_else(|error| panic!("{error} (or run `cargo xtask test`)"))
 }
@@ -49,7 +63,8 @@ pub fn record(scenario: &Scenario<f32>, machine: Machine, exit_code: i32) -> Rec
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let mut settings = settings::of(scenario);
     settings.push(format!("telemetry={TELEMETRY}"));
-    let finished = run(&image("ecu"), machine, &settings, folder.path(), TIME_OUT)
+    let image = board_image(machine.board(), "ecu");
+    let finished = run(&image, machine, &settings, folder.path(), TIME_OUT)
         .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(finished.exit_code, exit_code, "log: {:?}", finished.log);
     Recording::open(&folder.path().join(TELEMETRY)).unwrap_or_else(|error| panic!("{error}"))

@@ -1,30 +1,47 @@
 //! Builds the firmware, with the toolchain that has the target.
 
+use std::fs;
 use std::path::PathBuf;
+use std::process::Command;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 
 use crate::setup::target::TARGET;
 use crate::{process, rustup, workspace};
 
-/// Arguments that choose the firmware's profile.
-pub const PROFILE: [&str; 2] = ["--profile", "firmware"];
+/// The board that everything runs on unless it is told otherwise. Its images are where a plain `cargo build` puts them.
+pub const USUAL_BOARD: &str = "mps2";
 
-/// Builds the firmware's programs that `selection` names, or all of them for `["--bins"]`.
-pub fn build(toolchain: &str, selection: &[&str]) -> Result<()> {
-    let mut cargo = cargo(toolchain)?;
-    cargo
-        .arg("build")
-        .args(PROFILE)
-        .args(workspace::locked())
-        .args(selection);
-    process::run(&mut cargo)
+/// All boards: the folders in the firmware's `src/board`.
+pub fn boards() -> Result<Vec<String>> {
+    let folder = workspace::firmware().join("src").join("board");
+    let entries = fs::read_dir(&folder);
+    let entries = entries.with_context(|| format!("cannot read {}", folder.display()))?;
+    let folders = entries.flatten().filter(|entry| entry.path().is_dir());
+    let mut boards: Vec<String> = folders
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .collect();
+    boards.sort();
+    Ok(boards)
 }
 
-/// Cargo in the firmware's folder, where its own configuration holds.
-pub fn cargo(toolchain: &str) -> Result<std::process::Command> {
+/// Builds the firmware's programs that `selection` names for a board, or all of them for `["--bins"]`.
+pub fn build(toolchain: &str, board: &str, selection: &[&str]) -> Result<()> {
+    process::run(cargo(toolchain, "build", board)?.args(selection))
+}
+
+/// A command of cargo on the firmware for a board, in the firmware's folder, where its own configuration holds.
+pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
     let mut cargo = rustup::cargo(toolchain)?;
-    cargo.current_dir(workspace::firmware());
+    cargo
+        .current_dir(workspace::firmware())
+        .arg(command)
+        .args(["--profile", "firmware"])
+        .args(workspace::locked())
+        .arg("--no-default-features")
+        .arg(format!("--features=board-{board}"))
+        .arg("--target-dir")
+        .arg(target_dir(board)?);
     // These would replace what that configuration says: its target, and its linker arguments.
     for variable in [
         "RUSTFLAGS",
@@ -37,10 +54,16 @@ pub fn cargo(toolchain: &str) -> Result<std::process::Command> {
     Ok(cargo)
 }
 
-/// The ECU's program.
-pub fn elf() -> Result<PathBuf> {
-    Ok(workspace::target_dir()?
-        .join(TARGET)
-        .join("firmware")
-        .join("ecu"))
+/// The ECU's program for a board.
+pub fn elf(board: &str) -> Result<PathBuf> {
+    Ok(target_dir(board)?.join(TARGET).join("firmware").join("ecu"))
+}
+
+/// One for each board, or their programs, which have the same names, would replace each other.
+fn target_dir(board: &str) -> Result<PathBuf> {
+    let common = workspace::target_dir()?;
+    Ok(match board {
+        USUAL_BOARD => common,
+        _ => common.join("boards").join(board),
+    })
 }

@@ -74,11 +74,17 @@ enum Command {
     #[command(after_help = "Example:\n  cargo xtask lint")]
     Lint,
 
-    /// Builds the firmware; its last line of output is the path of the ELF file.
+    /// Builds the firmware for a board; its last line of output is the path of the ELF file.
     #[command(
-        after_help = "Example:\n  cargo xtask firmware && arm-none-eabi-size \"$(cargo xtask firmware | tail -n 1)\""
+        after_help = "Examples:\n  cargo xtask firmware && arm-none-eabi-size \"$(cargo xtask firmware | tail -n 1)\"\n  \
+                            cargo xtask firmware --board netduinoplus2\n  \
+                            cargo xtask firmware --board all"
     )]
-    Firmware,
+    Firmware {
+        /// The board, a folder of firmware/src/board, or `all`.
+        #[arg(long, default_value = firmware::USUAL_BOARD)]
+        board: String,
+    },
 }
 
 fn main() -> ExitCode {
@@ -88,7 +94,7 @@ fn main() -> ExitCode {
         Command::Demo { args } => jobs::demo::run(&args),
         Command::Test => jobs::test::run(),
         Command::Lint => jobs::lint::run(),
-        Command::Firmware => jobs::firmware::run(),
+        Command::Firmware { board } => jobs::firmware::run(&board),
     };
     outcome::report(result)
 }

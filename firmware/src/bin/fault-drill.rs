@@ -38,7 +38,9 @@ fn main() -> ! {
 /// Brings the PWM off its neutral duty, so that the way back shows in the trailer of `drill.bin`.
 fn drive_pwm() {
     use embedded_hal::pwm::SetDutyCycle;
-    let Ok(ecu) = OpenLoop::new(&Scenario::reconstruction()) else {
+    let mut scenario = Scenario::reconstruction();
+    scenario.servo.timer_clock_hz = Current::TIMER_CLOCK_HZ as f32;
+    let Ok(ecu) = OpenLoop::new(&scenario) else {
         return;
     };
     let period = ecu.pwm.neutral().period();

@@ -1,15 +1,33 @@
-//! What a board brings: a clock for the PWM interrupt, a PWM, a watchdog, and a counter that measures the tasks.
+//! What a board brings: a PWM, a clock for its interrupt, a watchdog, and a counter that measures the tasks.
+//!
+//! A board is one folder here, with its code and its memory map, and one feature `board-<folder>`. The build takes exactly
+//! one. docs/porting.md leads through a port.
 
+mod systick;
+
+#[cfg(feature = "board-mps2")]
 mod mps2;
+#[cfg(feature = "board-mps2")]
+pub use mps2::Mps2 as Current;
 
-/// The board that this image is for.
-pub type Current = mps2::Mps2;
+#[cfg(feature = "board-netduinoplus2")]
+mod netduinoplus2;
+#[cfg(feature = "board-netduinoplus2")]
+pub use netduinoplus2::NetduinoPlus2 as Current;
 
-/// A board. All of it is reachable from fault handlers, so nothing here needs a value.
+#[cfg(feature = "board-nucleog474re")]
+mod nucleog474re;
+#[cfg(feature = "board-nucleog474re")]
+pub use nucleog474re::NucleoG474re as Current;
+
+/// A board. Fault handlers reach all of it but the two `start`s, so nothing here needs a value.
 pub trait Board {
     /// The servo's PWM.
     type Pwm: embedded_hal::pwm::SetDutyCycle;
 
+    /// Clock of the PWM's timer, Hz. A scenario whose `servo.timer_clock_hz` is another is refused: its carrier and all its
+    /// times would be off by the ratio.
+    const TIMER_CLOCK_HZ: u32;
     /// Counts a second of [`cost_counter`](Self::cost_counter).
     const COST_CLOCK_HZ: u32;
     /// Instructions a second that the core executes, where it is simulated to execute that many; 0 on silicon.
@@ -22,22 +40,22 @@ pub trait Board {
     fn start_pwm(period: u16) -> Result<Self::Pwm, BoardError>;
 
     /// Stops the PWM interrupt; the PWM keeps its duty.
-    fn stop_pwm_interrupt();
+    fn stop_pwm_interrupt() {
+        systick::stop();
+    }
 
     /// Puts the PWM to the neutral duty at once. Works at any time and from any handler, also before it is started.
     fn neutralise_pwm();
 
-    /// Duty code that is on the PWM, and the neutral one.
+    /// Duty code that is on the PWM, and the neutral one; where there are registers, read back from them.
     fn pwm_output() -> (u16, u16);
 
-    /// A free-running counter, upwards.
+    /// A free-running counter, upwards, of 32 bits.
     fn cost_counter() -> u32;
 
-    /// Starts the watchdog, which raises the non-maskable interrupt when it is not fed for `timeout_ms`.
+    /// Starts the watchdog. When it is not fed for `timeout_ms`, it raises the non-maskable interrupt or, where it can only
+    /// do that, resets the chip, whose pins then leave the servo's bridge off.
     fn start_watchdog(timeout_ms: u32);
-
-    /// Passes time until there may be something to do.
-    fn idle();
 
     /// Feeds the watchdog.
     fn feed_watchdog();
@@ -51,12 +69,16 @@ pub trait Board {
     /// The next byte from it, if there is one.
     fn uart_receive() -> Option<u8>;
 
-    /// Stops the counter of [`cost_counter`](Self::cost_counter), the watchdog and the PWM interrupt, so that an emulated ECU
-    /// can wait for its host without ageing.
+    /// Stops the PWM interrupt, the counter of [`cost_counter`](Self::cost_counter) and, where it can be, the watchdog, so that an
+    /// ECU can wait for a host on the UART without ageing.
     fn pause_time();
 
     /// Goes on after [`pause_time`](Self::pause_time), the PWM interrupt with a whole period.
     fn resume_time();
+    /// Passes time until there may be something to do.
+    fn idle() {
+        cortex_m::asm::wfi();
+    }
 }
 
 /// Why a board cannot start its PWM.

@@ -1,6 +1,6 @@
 //! The firmware's image: is it one for this machine, and how large is it?
 
-use object::{Architecture, Object, ObjectSection, SectionFlags, elf};
+use object::{Architecture, Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
 use std::path::{Path, PathBuf};
 
 /// Data addresses start here on every Cortex-M.
@@ -82,6 +82,15 @@ impl Image {
             ram_bytes,
             bytes,
         })
+    }
+
+    /// Address of the function or variable with the given linker name; `None` if the image has none.
+    pub fn address_of(&self, name: &str) -> Option<u32> {
+        let file = object::File::parse(&*self.bytes).ok()?;
+        let symbol = file.symbols().find(|s| s.name() == Ok(name))?;
+        // The lowest bit of a function's symbol says that it is Thumb code; it is no part of the address.
+        let thumb = u64::from(symbol.kind() == object::SymbolKind::Text);
+        u32::try_from(symbol.address() & !thumb).ok()
     }
 }
 

@@ -2,6 +2,8 @@
 
 use crate::pil::elf::Image;
 use crate::pil::log::LogDecoder;
+#[cfg(unix)]
+pub use crate::pil::socket::SocketError;
 use std::io::Read;
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
@@ -11,8 +13,6 @@ use std::time::{Duration, Instant};
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
-/// Virtual time is counted in instructions, 2^5 ns each, and idle time is skipped: the same run every time.
-const INSTRUCTION_COUNTING: &str = "shift=5,align=off,sleep=off";
 const POLL: Duration = Duration::from_millis(5);
 
 /// Set when the user asks to stop; every emulator then ends.
@@ -27,6 +27,9 @@ pub enum Machine {
     /// Cortex-M7.
     #[value(name = "mps2-an500")]
     Mps2An500,
+    /// STM32F405, a Cortex-M4F, with timers that are those of the chip.
+    #[value(name = "netduinoplus2")]
+    NetduinoPlus2,
 }
 
 impl Machine {
@@ -35,14 +38,41 @@ impl Machine {
         match self {
             Self::Mps2An386 => "mps2-an386",
             Self::Mps2An500 => "mps2-an500",
+            Self::NetduinoPlus2 => "netduinoplus2",
+        }
+    }
+
+    /// The emulator's options for a host on `line` at the UART that the board's firmware links it with.
+    pub(super) fn serial_options(self, line: &str) -> Vec<&str> {
+        match self {
+            // UART 0 is the console; UART 1 is the link.
+            Self::Mps2An386 | Self::Mps2An500 => vec!["-serial", "null", "-serial", line],
+            Self::NetduinoPlus2 => vec!["-serial", line],
         }
     }
 
     /// Its core.
     pub fn core(self) -> &'static str {
         match self {
-            Self::Mps2An386 => "Cortex-M4F",
+            Self::Mps2An386 | Self::NetduinoPlus2 => "Cortex-M4F",
             Self::Mps2An500 => "Cortex-M7",
+        }
+    }
+
+    /// The firmware's board whose images run on it.
+    pub fn board(self) -> &'static str {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => "mps2",
+            Self::NetduinoPlus2 => "netduinoplus2",
+        }
+    }
+
+    /// Virtual time is counted in instructions, and idle time is skipped: the same run every time. An instruction takes 2^5
+    /// ns; on the STM32F405 2^3 ns, because its timers run some ten times faster than the program believes.
+    fn instruction_counting(self) -> &'static str {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => "shift=5,align=off,sleep=off",
+            Self::NetduinoPlus2 => "shift=3,align=off,sleep=off",
         }
     }
 }
@@ -91,6 +121,10 @@ pub enum RunError {
     /// The log's symbols cannot be read.
     #[error("cannot decode the firmware's log: {0:#}")]
     Log(anyhow::Error),
+    /// The emulator cannot be watched or steered from outside.
+    #[cfg(unix)]
+    #[error("cannot steer {PROGRAM}: {0}")]
+    NotSteered(#[from] SocketError),
 }
 
 /// A finished run.
@@ -146,8 +180,17 @@ pub fn run(
     on_line: impl Fn(&str) + Sync,
 ) -> Result<Finished, RunError> {
     let decoder = LogDecoder::new(image).map_err(RunError::Log)?;
-    let silent = ["-serial".into(), "none".into()];
-    let mut emulator = start(image, machine, settings, directory, &silent)?;
+    let emulator = start(image, machine, settings, directory, SILENT)?;
+    attend(emulator, &decoder, limit, on_line)
+}
+
+/// Sees a run to its end.
+pub(super) fn attend(
+    mut emulator: Emulator,
+    decoder: &LogDecoder,
+    limit: Duration,
+    on_line: impl Fn(&str) + Sync,
+) -> Result<Finished, RunError> {
     let console = emulator.0.stdout.take().expect("stdout is piped");
     let errors = emulator.0.stderr.take().expect("stderr is piped");
     thread::scope(|scope| {
@@ -169,13 +212,16 @@ pub fn run(
     })
 }
 
-/// Starts the emulator with `more` arguments.
+/// Options of an emulator without serial lines.
+pub(super) const SILENT: &[&str] = &["-serial", "none"];
+
+/// Starts the emulator; `options` are more of its own.
 pub(super) fn start(
     image: &Image,
     machine: Machine,
     settings: &[String],
     directory: &Path,
-    more: &[String],
+    options: &[&str],
 ) -> Result<Emulator, RunError> {
     let mut semihosting = String::from("enable=on,target=native,arg=firmware");
     for setting in settings {
@@ -187,8 +233,8 @@ pub(super) fn start(
     command
         .args(["-machine", machine.name(), "-display", "none"])
         .args(["-monitor", "none"])
-        .args(more)
-        .args(["-icount", INSTRUCTION_COUNTING])
+        .args(["-icount", machine.instruction_counting()])
+        .args(options)
         .args(["-semihosting-config", &semihosting])
         .arg("-kernel")
         .arg(image)

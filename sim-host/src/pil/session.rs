@@ -78,16 +78,22 @@ impl Session {
         machine: Machine,
         settings: &[String],
         link: LinkKind,
-        more_arguments: &[String],
+        options: &[&str],
         limit: Duration,
     ) -> Result<Self, RunError> {
         let directory = tempfile::tempdir().map_err(RunError::NotStarted)?;
         let decoder = LogDecoder::new(image).map_err(RunError::Log)?;
         let mut settings = settings.to_vec();
         settings.push(link.setting().into());
-        let mut arguments = more_arguments.to_vec();
-        let waiting = prepare(link, directory.path(), &mut arguments)?;
-        let mut emulator = qemu::start(image, machine, &settings, directory.path(), &arguments)?;
+        let socket = directory.path().join(UART_SOCKET);
+        let line = format!("unix:{},server=on,wait=on", socket.display());
+        let serial = match link {
+            LinkKind::Files => qemu::SILENT.to_vec(),
+            LinkKind::Uart => machine.serial_options(&line),
+        };
+        let waiting = prepare(link, directory.path())?;
+        let options = [&serial, options].concat();
+        let mut emulator = qemu::start(image, machine, &settings, directory.path(), &options)?;
         let console = emulator.0.stdout.take().expect("stdout is piped");
         let last_line = Arc::new(Mutex::new(String::from("(none)")));
         let seen = Arc::clone(&last_line);
@@ -201,11 +207,7 @@ enum Waiting {
     Uart { socket: PathBuf },
 }
 
-fn prepare(
-    link: LinkKind,
-    directory: &Path,
-    arguments: &mut Vec<String>,
-) -> Result<Waiting, RunError> {
+fn prepare(link: LinkKind, directory: &Path) -> Result<Waiting, RunError> {
     match link {
         LinkKind::Files => {
             for name in [TO_HOST, TO_ECU] {
@@ -222,13 +224,9 @@ fn prepare(
                 to_ecu: directory.join(TO_ECU),
             })
         }
-        LinkKind::Uart => {
-            let socket = directory.join(UART_SOCKET);
-            // UART 0 is the console; UART 1 is the link.
-            arguments.extend(["-serial".into(), "null".into(), "-serial".into()]);
-            arguments.push(format!("unix:{},server=on,wait=on", socket.display()));
-            Ok(Waiting::Uart { socket })
-        }
+        LinkKind::Uart => Ok(Waiting::Uart {
+            socket: directory.join(UART_SOCKET),
+        }),
     }
 }
 

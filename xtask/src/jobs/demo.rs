@@ -11,7 +11,9 @@ use crate::{firmware, process, setup, workspace};
 /// Sets up, builds, and lets the host's program run and judge the firmware.
 pub fn run(args: &[String]) -> Result<()> {
     let toolchain = stage("set-up", setup::tools)?;
-    stage("firmware", || firmware::build(&toolchain, &["--bins"]))?;
+    stage("firmware", || {
+        firmware::build(&toolchain, firmware::USUAL_BOARD, &["--bins"])
+    })?;
     stage("host program", build_sim_host)?;
     stage("verify", || verify(args))
 }
@@ -21,7 +23,7 @@ fn verify(args: &[String]) -> Result<()> {
     sim_host
         .current_dir(workspace::root())
         .args(["verify", "--force", "--firmware"])
-        .arg(firmware::elf()?)
+        .arg(firmware::elf(firmware::USUAL_BOARD)?)
         .args(args);
     let status = process::status(&mut sim_host)?;
     match status.code() {

@@ -1,12 +1,21 @@
 //! `cargo xtask firmware`.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 
 use super::stage;
 use crate::{firmware, rustup, setup};
 
-/// Builds the firmware's programs and prints the path of the ECU's.
-pub fn run() -> Result<()> {
+/// What stands for every board.
+const ALL: &str = "all";
+
+/// Builds the firmware's programs for `board`, or for all boards, and prints the path of each ECU's.
+pub fn run(board: &str) -> Result<()> {
+    let known = firmware::boards()?;
+    let chosen: Vec<&str> = match known.iter().find(|known| *known == board) {
+        Some(board) => vec![board],
+        None if board == ALL => known.iter().map(String::as_str).collect(),
+        None => bail!("no board {board}: choose {} or {ALL}", known.join(", ")),
+    };
     let pinned = rustup::require_pinned()?;
     let toolchain = setup::target::toolchain(&pinned)?;
     let toolchain = toolchain.with_context(|| {
@@ -15,7 +24,13 @@ pub fn run() -> Result<()> {
             setup::target::TARGET
         )
     })?;
-    stage("firmware", || firmware::build(&toolchain, &["--bins"]))?;
-    println!("{}", firmware::elf()?.display());
+    for board in &chosen {
+        stage(&format!("firmware for {board}"), || {
+            firmware::build(&toolchain, board, &["--bins"])
+        })?;
+    }
+    for board in chosen {
+        println!("{}", firmware::elf(board)?.display());
+    }
     Ok(())
 }

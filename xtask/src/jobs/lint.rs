@@ -21,7 +21,11 @@ pub fn run() -> Result<()> {
             setup::target::missing(&pinned)
         );
     }
-    stage("clippy on the firmware", || firmware(&pinned))?;
+    for board in firmware::boards()? {
+        stage(&format!("clippy on the firmware for {board}"), || {
+            firmware(&pinned, &board)
+        })?;
+    }
     println!("passed: format, clippy on host and firmware");
     Ok(())
 }
@@ -44,23 +48,18 @@ fn format(pinned: &str) -> Result<()> {
 
 fn host(pinned: &str) -> Result<()> {
     let mut cargo = rustup::cargo(pinned)?;
-    cargo.args([
-        "clippy",
-        "--workspace",
-        "--exclude",
-        "firmware",
-        "--all-targets",
-    ]);
+    cargo
+        .args(["clippy", "--workspace", "--exclude", "firmware"])
+        .arg("--all-targets")
+        .args(workspace::locked());
     clippy(&mut cargo)
 }
 
-fn firmware(pinned: &str) -> Result<()> {
-    let mut cargo = firmware::cargo(pinned)?;
-    cargo.arg("clippy").args(firmware::PROFILE).arg("--bins");
-    clippy(&mut cargo)
+fn firmware(pinned: &str, board: &str) -> Result<()> {
+    clippy(firmware::cargo(pinned, "clippy", board)?.arg("--bins"))
 }
 
 fn clippy(cargo: &mut std::process::Command) -> Result<()> {
-    let done = process::run(cargo.args(workspace::locked()).args(DENY_WARNINGS));
+    let done = process::run(cargo.args(DENY_WARNINGS));
     done.context(Exit::failed("clippy found something; it is named above"))
 }

@@ -19,10 +19,18 @@ pub fn run() -> Result<()> {
     let toolchain = stage("set-up", setup::tools)?;
     // Before any test: a comparison that would be left out is no pass.
     stage("Python packages of the tests", setup::python::ensure)?;
-    stage("firmware", || {
-        firmware::build(&toolchain, &["--bin", "ecu", "--bin", "fault-drill"])
-    })?;
-    stage("panic-free proof", || prove_panic_free(&toolchain))?;
+    for board in firmware::boards()? {
+        stage(&format!("firmware for {board}"), || {
+            firmware::build(
+                &toolchain,
+                &board,
+                &["--bin", "ecu", "--bin", "fault-drill"],
+            )
+        })?;
+        stage(&format!("panic-free proof for {board}"), || {
+            prove_panic_free(&toolchain, &board)
+        })?;
+    }
     stage("build of the model's tests", || {
         cargo_test(&MODEL, &["--no-run"])
     })?;
@@ -30,25 +38,21 @@ pub fn run() -> Result<()> {
     stage("build of all tests", || cargo_test(&HOST, &["--no-run"]))?;
     stage("all tests", || tests(&HOST))?;
     println!(
-        "passed: the panic-free proof of the firmware, the model's tests with overflow checks, all tests in release"
+        "passed: the panic-free proof of the firmware for every board, the model's tests with overflow checks, all tests in release"
     );
     Ok(())
 }
 
 /// Links the control path with a panic handler that calls a function which does not exist.
-fn prove_panic_free(toolchain: &str) -> Result<()> {
+fn prove_panic_free(toolchain: &str, board: &str) -> Result<()> {
     println!("   the link is the proof: it fails if a panic can be reached from the control path");
-    let all = firmware::build(toolchain, &["--bins"]);
+    let all = firmware::build(toolchain, board, &["--bins"]);
     all.context(Exit::failed("`panic-free` did not build; a missing function in the linker's message means that a panic can be reached"))?;
     println!("   panic-free linked: no panic can be reached");
 
     // A proof that cannot fail is none: with a panic put into the path, the link must miss the function.
-    let mut cargo = firmware::cargo(toolchain)?;
-    cargo
-        .arg("build")
-        .args(firmware::PROFILE)
-        .args(workspace::locked())
-        .args(["--bin", "panic-free", "--features", "reachable-panic"]);
+    let mut cargo = firmware::cargo(toolchain, "build", board)?;
+    cargo.args(["--bin", "panic-free", "--features", "reachable-panic"]);
     let output = cargo.output().context("cargo does not start")?;
     let seen = String::from_utf8_lossy(&output.stderr).contains(MISSING_FUNCTION);
     if output.status.success() || !seen {

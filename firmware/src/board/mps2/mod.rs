@@ -1,14 +1,11 @@
 //! Arm MPS2 with the AN386 (Cortex-M4F) or AN500 (Cortex-M7) image, as QEMU emulates them.
 //!
-//! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of RAM and records every code
-//! in a ring, if there is one.
+//! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of RAM.
 
-use super::{Board, BoardError};
-use crate::recorder;
+use super::{Board, BoardError, systick};
 use core::convert::Infallible;
 use core::ptr::{read_volatile, write_volatile};
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
-use cortex_m::peripheral::{SYST, syst::SystClkSource};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
 /// Clock of the core, SysTick and the APB timers, Hz.
@@ -32,8 +29,6 @@ const WATCHDOG_UNLOCK_KEY: u32 = 0x1ACC_E551;
 /// Raises the non-maskable interrupt at the first expiry, without a reset at the second.
 const WATCHDOG_INTERRUPT: u32 = 1;
 
-/// Enable bit of SysTick's control register.
-const SYSTICK_ENABLE: u32 = 1;
 /// CMSDK UART 1: data, state, control and baud-rate registers. UART 0 is the console.
 const UART1_DATA: *mut u32 = 0x4000_5000 as *mut u32;
 const UART1_STATE: *mut u32 = 0x4000_5004 as *mut u32;
@@ -58,7 +53,6 @@ pub struct Mps2;
 /// The virtual PWM.
 pub struct VirtualPwm {
     period: u16,
-    recording: Option<recorder::DutyRecording>,
 }
 
 impl ErrorType for VirtualPwm {
@@ -71,11 +65,7 @@ impl SetDutyCycle for VirtualPwm {
     }
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-        let duty = duty.min(self.period);
-        DUTY.store(duty, Ordering::Relaxed);
-        if let Some(recording) = &mut self.recording {
-            recording.push(duty);
-        }
+        DUTY.store(duty.min(self.period), Ordering::Relaxed);
         Ok(())
     }
 }
@@ -83,11 +73,11 @@ impl SetDutyCycle for VirtualPwm {
 impl Board for Mps2 {
     type Pwm = VirtualPwm;
 
+    const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
     const COST_CLOCK_HZ: u32 = CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = INSTRUCTION_RATE_HZ;
 
     fn start_pwm(period: u16) -> Result<VirtualPwm, BoardError> {
-        let recording = recorder::take_duty_recording();
         let mut core = cortex_m::Peripherals::take().ok_or(BoardError)?;
         PERIOD.store(period, Ordering::Relaxed);
         Self::neutralise_pwm();
@@ -98,17 +88,8 @@ impl Board for Mps2 {
             write_volatile(TIMER0_VALUE, u32::MAX);
             write_volatile(TIMER0_CTRL, 1);
         }
-        core.SYST.set_clock_source(SystClkSource::Core);
-        core.SYST.set_reload(u32::from(period) - 1);
-        core.SYST.clear_current();
-        core.SYST.enable_interrupt();
-        core.SYST.enable_counter();
-        Ok(VirtualPwm { period, recording })
-    }
-
-    fn stop_pwm_interrupt() {
-        // SAFETY: a write to one register of SysTick, which only this module uses.
-        unsafe { (*SYST::PTR).csr.write(0) };
+        systick::start(&mut core.SYST, period);
+        Ok(VirtualPwm { period })
     }
 
     fn neutralise_pwm() {
@@ -176,13 +157,13 @@ impl Board for Mps2 {
     }
 
     fn pause_time() {
-        // SAFETY: writes to control registers of timer, watchdog and SysTick, which only this module uses.
+        systick::pause();
+        // SAFETY: writes to control registers of timer and watchdog, which only this module uses.
         unsafe {
             write_volatile(TIMER0_CTRL, 0);
             // Its counter goes on all the same; what it has left is put back in the end.
             write_volatile(WATCHDOG_CTRL, 0);
             WATCHDOG_LEFT.store(read_volatile(WATCHDOG_VALUE), Ordering::Relaxed);
-            (*SYST::PTR).csr.modify(|bits| bits & !SYSTICK_ENABLE);
         }
     }
 
@@ -192,9 +173,8 @@ impl Board for Mps2 {
         unsafe {
             write_volatile(TIMER0_CTRL, 1);
             write_volatile(WATCHDOG_CTRL, WATCHDOG_INTERRUPT);
-            (*SYST::PTR).cvr.write(0);
-            (*SYST::PTR).csr.modify(|bits| bits | SYSTICK_ENABLE);
         }
+        systick::resume();
     }
 }
 

@@ -1,0 +1,131 @@
+//! Nucleo-G474RE: STM32G474 (Cortex-M4F). It builds and passes the proofs of the link; no emulator has this chip.
+//!
+//! TIM3's first channel, on pin PA6, is the servo's PWM. TIM2 counts the cost of the tasks. USART1, on PC4 and PC5, links a host.
+//! All clocks are the 16 MHz of the
+//! internal oscillator, which the chip has after a reset.
+
+use super::{Board, BoardError, systick};
+use stm32g4xx_hal::gpio::{AF2, PA6};
+use stm32g4xx_hal::independent_watchdog::IndependentWatchdog;
+use stm32g4xx_hal::prelude::*;
+use stm32g4xx_hal::pwm::{ActiveHigh, C1, ComplementaryImpossible, Pwm, PwmAdvExt};
+use stm32g4xx_hal::rcc::Enable;
+use stm32g4xx_hal::stm32 as pac;
+use stm32g4xx_hal::time::ExtU32;
+
+/// Clock of core, SysTick and timers, Hz.
+const CLOCK_HZ: u32 = 16_000_000;
+
+/// 1 Mbit/s.
+const UART_DIVIDER: u32 = CLOCK_HZ / 1_000_000;
+
+/// The board.
+pub struct NucleoG474re;
+
+impl Board for NucleoG474re {
+    type Pwm = Pwm<pac::TIM3, C1, ComplementaryImpossible, ActiveHigh, ActiveHigh>;
+
+    const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
+    const COST_CLOCK_HZ: u32 = CLOCK_HZ;
+    const INSTRUCTION_RATE_HZ: u32 = 0;
+
+    fn start_pwm(period: u16) -> Result<Self::Pwm, BoardError> {
+        let chip = pac::Peripherals::take().ok_or(BoardError)?;
+        let mut core = cortex_m::Peripherals::take().ok_or(BoardError)?;
+        let mut rcc = chip.RCC.constrain();
+        let pins = chip.GPIOA.split(&mut rcc);
+
+        pac::TIM2::enable(&mut rcc);
+        // SAFETY: the register takes any value.
+        chip.TIM2.arr().write(|w| unsafe { w.arr().bits(u32::MAX) });
+        chip.TIM2.cr1().write(|w| w.cen().set_bit());
+
+        let pin: PA6<AF2> = pins.pa6.into_alternate();
+        let builder = chip.TIM3.pwm_advanced(pin, &mut rcc);
+        let (_, mut pwm) = builder.period(period - 1).finalize();
+        Self::neutralise_pwm();
+        pwm.enable();
+        // Right behind the restart of the period, so that the interrupt writes a duty early in a period and it is taken over
+        // at that period's end, never in doubt between two.
+        systick::start(&mut core.SYST, period);
+        Ok(pwm)
+    }
+
+    fn neutralise_pwm() {
+        let (_, neutral) = Self::pwm_output();
+        // SAFETY: writes to two registers of the timer, each of which is right at any time.
+        let timer = unsafe { &*pac::TIM3::ptr() };
+        // SAFETY: as above; the register takes any duty.
+        timer
+            .ccr1()
+            .write(|w| unsafe { w.ccr().bits(neutral.into()) });
+        // Takes the duty over now, and not only when the period is over.
+        timer.egr().write(|w| w.ug().set_bit());
+    }
+
+    fn pwm_output() -> (u16, u16) {
+        // SAFETY: reads of two registers, without side effect.
+        let timer = unsafe { &*pac::TIM3::ptr() };
+        let period = timer.arr().read().arr().bits() + 1;
+        (timer.ccr1().read().ccr().bits() as u16, (period / 2) as u16)
+    }
+
+    fn cost_counter() -> u32 {
+        // SAFETY: a read of the counter, without side effect.
+        unsafe { (*pac::TIM2::ptr()).cnt().read().bits() }
+    }
+
+    fn start_watchdog(timeout_ms: u32) {
+        // SAFETY: nothing else uses the two peripherals.
+        let (iwdg, debug) = unsafe { (pac::IWDG::steal(), pac::DBGMCU::steal()) };
+        // A debugger that serves semihosting halts the core each time.
+        debug.apb1l_fz().modify(|_, w| w.dbg_iwdg_stop().set_bit());
+        IndependentWatchdog::new(iwdg).start(timeout_ms.millis());
+    }
+
+    fn feed_watchdog() {
+        // SAFETY: nothing else uses the watchdog.
+        IndependentWatchdog::new(unsafe { pac::IWDG::steal() }).feed();
+    }
+
+    fn open_uart() {
+        // SAFETY: port C and USART1 are used by nothing else, and their clocks by nothing that runs at the same time.
+        let (rcc, port, uart) =
+            unsafe { (&*pac::RCC::ptr(), &*pac::GPIOC::ptr(), &*pac::USART1::ptr()) };
+        rcc.ahb2enr().modify(|_, w| w.gpiocen().set_bit());
+        rcc.apb2enr().modify(|_, w| w.usart1en().set_bit());
+        port.afrl().modify(|_, w| w.afrl4().af7().afrl5().af7());
+        port.moder()
+            .modify(|_, w| w.moder4().alternate().moder5().alternate());
+        // SAFETY: a divider that the UART takes.
+        uart.brr().write(|w| unsafe { w.bits(UART_DIVIDER) });
+        uart.cr1()
+            .write(|w| w.ue().set_bit().te().set_bit().re().set_bit());
+    }
+
+    fn uart_send(byte: u8) {
+        // SAFETY: nothing else uses the UART.
+        let uart = unsafe { &*pac::USART1::ptr() };
+        while uart.isr().read().txe().bit_is_clear() {}
+        uart.tdr().write(|w| unsafe { w.bits(byte.into()) });
+    }
+
+    fn uart_receive() -> Option<u8> {
+        // SAFETY: nothing else uses the UART; reading the data takes the byte out.
+        let uart = unsafe { &*pac::USART1::ptr() };
+        let is_full = uart.isr().read().rxne().bit_is_set();
+        is_full.then(|| uart.rdr().read().bits() as u8)
+    }
+
+    fn pause_time() {
+        systick::pause();
+        // SAFETY: nothing else uses the timer. The watchdog cannot be stopped.
+        unsafe { (*pac::TIM2::ptr()).cr1().write(|w| w.cen().clear_bit()) };
+    }
+
+    fn resume_time() {
+        // SAFETY: as above.
+        unsafe { (*pac::TIM2::ptr()).cr1().write(|w| w.cen().set_bit()) };
+        systick::resume();
+    }
+}
