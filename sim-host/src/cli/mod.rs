@@ -11,6 +11,8 @@ mod nonlinearity;
 mod orbit;
 mod output;
 mod phase;
+#[cfg(unix)]
+mod pil;
 mod poincare;
 mod qemu;
 mod realisability;
@@ -53,6 +55,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Verify(verify::Arguments),
+    #[cfg(unix)]
+    Pil(pil::Arguments),
     Simulate(simulate::Arguments),
     Reproduce(reproduce::Arguments),
     Lyapunov(lyapunov::Arguments),
@@ -98,6 +102,8 @@ pub fn main() -> ExitCode {
     }
     let done = match command {
         Command::Verify(arguments) => verify::run(&arguments),
+        #[cfg(unix)]
+        Command::Pil(arguments) => pil::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Reproduce(arguments) => reproduce::run(&arguments),
         Command::Lyapunov(arguments) => lyapunov::run(&arguments),

@@ -65,7 +65,7 @@ pub fn run(
 }
 
 /// How far two runs agree.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Comparison {
     /// Duty codes that were compared.
     pub duties: usize,

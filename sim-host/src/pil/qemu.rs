@@ -42,6 +42,14 @@ impl Machine {
         }
     }
 
+    /// Clock of the PWM's timer that the board's firmware has, Hz.
+    pub fn timer_clock_hz(self) -> f64 {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => 25e6,
+            Self::NetduinoPlus2 => 16e6,
+        }
+    }
+
     /// The emulator's options for a host on `line` at the UART that the board's firmware links it with.
     pub(super) fn serial_options(self, line: &str) -> Vec<&str> {
         match self {

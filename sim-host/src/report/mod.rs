@@ -10,6 +10,7 @@ mod sample;
 pub mod terminal;
 mod text;
 
+pub use figure::drive::draw as drive;
 pub use figure::schedule_map::draw as schedule_map;
 
 use crate::trace::Trace;

@@ -20,38 +20,60 @@ pub fn draw(title: &str, run: &Run) -> anyhow::Result<String> {
     }
     let of_record = |value: fn(&Record) -> f64| -> Vec<Point> {
         let records = run.records.iter();
-        records.map(|record| (record.time_s, value(record))).collect()
+        records
+            .map(|record| (record.time_s, value(record)))
+            .collect()
     };
     let amplitude = run.records.iter().zip(&run.actuations);
     let amplitude = amplitude.filter_map(|(record, actuation)| {
-        Some((record.time_s, f64::from(actuation.as_ref()?.dither_amplitude_v)))
+        Some((
+            record.time_s,
+            f64::from(actuation.as_ref()?.dither_amplitude_v),
+        ))
     });
     let curves = [
-        ("wheel speed (rpm)", of_record(|record| record.wheel_speed_rpm)),
-        ("yaw rate \u{3b3} (rad/s)", of_record(|record| record.yaw_rate_rad_per_s)),
-        ("steering angle \u{3b4} (rad)", of_record(|record| record.steering_angle_rad)),
-        ("motor current (A)", of_record(|record| record.motor_current_a)),
+        (
+            "wheel speed (rpm)",
+            of_record(|record| record.wheel_speed_rpm),
+        ),
+        (
+            "yaw rate \u{3b3} (rad/s)",
+            of_record(|record| record.yaw_rate_rad_per_s),
+        ),
+        (
+            "steering angle \u{3b4} (rad)",
+            of_record(|record| record.steering_angle_rad),
+        ),
+        (
+            "motor current (A)",
+            of_record(|record| record.motor_current_a),
+        ),
         ("dither amplitude (V)", amplitude.collect()),
     ];
     let end_s = run.records.last().map_or(1.0, |record| record.time_s);
     let heading = format!("In the loop \u{2013} {title}");
-    figure(&heading, &legend, stack_height(curves.len(), PANEL), |area| {
-        let rows = stack(area, curves.len(), PANEL, "time (s)");
-        for ((area, time), (name, curve)) in rows.into_iter().zip(curves) {
-            let curve = extremes(curve.into_iter(), BUCKETS);
-            let panel = Panel::new(
-                &area,
-                ("", ""),
-                Axis::linear(time, 0.0, end_s, 15),
-                Axis::around(name, curve.iter().map(|point| point.1), 4),
-            )?;
-            if let Some(from_s) = safe {
-                panel.band(from_s, end_s)?;
+    figure(
+        &heading,
+        &legend,
+        stack_height(curves.len(), PANEL),
+        |area| {
+            let rows = stack(area, curves.len(), PANEL, "time (s)");
+            for ((area, time), (name, curve)) in rows.into_iter().zip(curves) {
+                let curve = extremes(curve.into_iter(), BUCKETS);
+                let panel = Panel::new(
+                    &area,
+                    ("", ""),
+                    Axis::linear(time, 0.0, end_s, 15),
+                    Axis::around(name, curve.iter().map(|point| point.1), 4),
+                )?;
+                if let Some(from_s) = safe {
+                    panel.band(from_s, end_s)?;
+                }
+                panel.lines(&[(&curve, MAIN)])?;
             }
-            panel.lines(&[(&curve, MAIN)])?;
-        }
-        Ok(())
-    })
+            Ok(())
+        },
+    )
 }
 
 /// When the ECU fell into its safe state, if it did.

@@ -2,6 +2,7 @@
 
 pub(super) mod axis;
 mod divergence;
+pub(super) mod drive;
 mod instructions;
 mod one_step_defect;
 pub(super) mod panel;

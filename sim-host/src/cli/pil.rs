@@ -1,0 +1,323 @@
+//! `sim-host pil`: manoeuvres with the ECU in the loop.
+
+use super::output::{Output, check_free};
+use super::{Done, time_out, waveform};
+use anyhow::{Context, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use sim_host::closed_loop::drive::ecu_scenario;
+use sim_host::closed_loop::levels::{Levels, Target, drive};
+use sim_host::closed_loop::manoeuvre::{self, Manoeuvre};
+use sim_host::closed_loop::profile::Profile;
+use sim_host::closed_loop::record::write_csv;
+use sim_host::closed_loop::recording::Recording;
+use sim_host::closed_loop::run::{Comparison, Depth, compare};
+use sim_host::config::validate;
+use sim_host::pil::elf::Image;
+use sim_host::pil::qemu::Machine;
+use sim_host::pil::session::LinkKind;
+use sim_host::report;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Drive manoeuvres with the ECU in the loop: as a model, as software on this host, and as firmware in QEMU; compare the three
+/// period by period.
+///
+/// The vehicle moves on the host in f64; once a PWM period the ECU puts out its duty and the vehicle answers. The same run always
+/// gives the same bytes.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host pil                                            1750 rpm, square dither from 3 s
+  sim-host pil --rpm 1880 --dither sine --figure pil.svg
+  sim-host pil --scenario examples/manoeuvres/speed-ramp.toml --record ramp.loop --out ramp.csv
+  sim-host pil --replay ramp.loop                         the same again without QEMU
+  sim-host pil --scenario examples/manoeuvres/*.toml      a table over all of them
+  sim-host pil --link uart --time 1                       over the board's UART: realistic, and slow")]
+pub struct Arguments {
+    /// Manoeuvres, as TOML files [default: constant speed of 1750 rpm, square dither from 3 s, 20 s]
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    scenario: Vec<PathBuf>,
+    /// Constant wheel speed instead of the manoeuvre's, rpm
+    #[arg(long, value_name = "RPM", allow_negative_numbers = true)]
+    rpm: Option<f64>,
+    /// Waveform of the dither instead of the manoeuvre's: none, square or sine
+    #[arg(long, value_name = "WAVEFORM", value_parser = waveform)]
+    dither: Option<Waveform>,
+    /// Length instead of the manoeuvre's, s
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    time: Option<f64>,
+    /// What carries the exchange with the firmware
+    #[arg(long, value_enum, default_value = "files")]
+    link: LinkKind,
+    /// Machine to emulate
+    #[arg(long, value_enum, default_value = "mps2-an386")]
+    machine: Machine,
+    /// Firmware image (ELF)
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
+    )]
+    firmware: PathBuf,
+    /// Record all that passes between the firmware and the vehicle
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Replay a recorded run without QEMU, and compare
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["scenario", "rpm", "dither", "time", "record", "out", "json", "figure"])]
+    replay: Option<PathBuf>,
+    /// Write the vehicle's motion as CSV, one row a control tick
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the comparisons as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Draw the manoeuvre as an SVG figure
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+    /// Overwrite files that exist
+    #[arg(long)]
+    force: bool,
+    /// Longest time that the firmware may take for one answer, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
+    time_out: f64,
+}
+
+const USUAL: &str = include_str!("../../../examples/manoeuvres/constant-speed.toml");
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    if let Some(file) = &arguments.replay {
+        return replay(file);
+    }
+    let manoeuvres = arguments.manoeuvres()?;
+    arguments.check_outputs(manoeuvres.len())?;
+    let target = Target {
+        image: Image::open(&arguments.firmware)?,
+        machine: arguments.machine,
+        link: arguments.link,
+        time_out: time_out(arguments.time_out)?,
+    };
+    let mut driven = Vec::new();
+    for (scenario, manoeuvre) in &manoeuvres {
+        let levels =
+            with_progress(scenario, manoeuvre, &target).with_context(|| manoeuvre.name.clone())?;
+        arguments.write(scenario, manoeuvre, &levels)?;
+        // All that is kept of a run that may be long.
+        driven.push(Summary::of(&levels));
+    }
+    if let Some(path) = &arguments.json {
+        write_text(
+            path,
+            &(serde_json::to_string_pretty(&driven)? + "\n"),
+            arguments.force,
+        )?;
+    }
+    show(&driven, arguments.link);
+    Ok(if driven.iter().all(|summary| summary.agree) {
+        Done::Well
+    } else {
+        Done::Failed
+    })
+}
+
+impl Arguments {
+    fn manoeuvres(&self) -> anyhow::Result<Vec<(Scenario<f64>, Manoeuvre)>> {
+        let mut manoeuvres = Vec::new();
+        for file in &self.scenario {
+            let loaded = manoeuvre::load(file);
+            manoeuvres.push(loaded.with_context(|| file.display().to_string())?);
+        }
+        if self.scenario.is_empty() {
+            manoeuvres.push(manoeuvre::from_text(USUAL)?);
+        }
+        for (scenario, manoeuvre) in &mut manoeuvres {
+            self.adapt(scenario, manoeuvre)?;
+        }
+        Ok(manoeuvres)
+    }
+
+    fn adapt(&self, scenario: &mut Scenario<f64>, manoeuvre: &mut Manoeuvre) -> anyhow::Result<()> {
+        if let Some(rpm) = self.rpm {
+            manoeuvre.wheel_speed_rpm = Profile::constant(rpm);
+            manoeuvre.name = format!("{}, at {rpm} rpm", manoeuvre.name);
+        }
+        if let Some(waveform) = self.dither {
+            scenario.dither.waveform = waveform;
+        }
+        scenario.run.duration_s = self.time.unwrap_or(scenario.run.duration_s);
+        scenario.servo.timer_clock_hz = self.machine.timer_clock_hz();
+        manoeuvre.validate()?;
+        validate(&manoeuvre.begin(scenario))?;
+        Ok(())
+    }
+
+    /// Refuses what cannot be written, before any work is done for it.
+    fn check_outputs(&self, manoeuvres: usize) -> anyhow::Result<()> {
+        let of_one = [
+            ("--record", &self.record),
+            ("--out", &self.out),
+            ("--figure", &self.figure),
+        ];
+        for (option, path) in of_one {
+            ensure!(
+                path.is_none() || manoeuvres == 1,
+                "{option}: takes one manoeuvre, and there are {manoeuvres}; give one --scenario"
+            );
+        }
+        let files = [&self.record, &self.out, &self.figure, &self.json];
+        files
+            .into_iter()
+            .flatten()
+            .try_for_each(|path| check_free(path, self.force))
+    }
+
+    fn write(
+        &self,
+        scenario: &Scenario<f64>,
+        manoeuvre: &Manoeuvre,
+        levels: &Levels,
+    ) -> anyhow::Result<()> {
+        let run = &levels.processor.run;
+        if let Some(path) = &self.record {
+            let recording = Recording {
+                scenario: ecu_scenario(scenario, manoeuvre),
+                exchanges: run.exchanges.clone(),
+            };
+            let mut output = Output::create(path, self.force)?;
+            recording.write(output.writer())?;
+            output.finish()?;
+        }
+        if let Some(path) = &self.out {
+            let mut output = Output::create(path, self.force)?;
+            write_csv(&run.records, output.writer())?;
+            output.finish()?;
+        }
+        if let Some(path) = &self.figure {
+            write_text(path, &report::drive(&levels.name, run)?, self.force)?;
+        }
+        Ok(())
+    }
+}
+
+fn write_text(path: &Path, text: &str, force: bool) -> anyhow::Result<()> {
+    let mut output = Output::create(path, force)?;
+    output.writer().write_all(text.as_bytes())?;
+    output.finish()
+}
+
+fn with_progress(
+    scenario: &Scenario<f64>,
+    manoeuvre: &Manoeuvre,
+    target: &Target,
+) -> anyhow::Result<Levels> {
+    /// PWM periods between two looks at the clock.
+    const REPORTED: u64 = 1000;
+    let rate_hz = scenario.run.pwm_rate_hz;
+    let bar = ProgressBar::new((scenario.run.duration_s * rate_hz) as u64).with_style(
+        ProgressStyle::with_template("{elapsed_precise} [{bar:40}] {percent} % {msg}, {eta} left")
+            .expect("the template is valid")
+            .progress_chars("=> "),
+    );
+    bar.set_message(manoeuvre.name.clone());
+    let mut periods = 0;
+    let levels = drive(scenario, manoeuvre, target, || {
+        periods += 1;
+        if periods % REPORTED == 0 {
+            bar.set_position(periods);
+        }
+    });
+    bar.finish_and_clear();
+    Ok(levels?)
+}
+
+/// What is said of a manoeuvre.
+#[derive(serde::Serialize)]
+struct Summary {
+    manoeuvre: String,
+    simulated_s: f64,
+    model_software: Comparison,
+    software_processor: Comparison,
+    double_precision_different_duties: usize,
+    double_precision_worst_counts: u16,
+    agree: bool,
+    times_real_time: f64,
+}
+
+impl Summary {
+    fn of(levels: &Levels) -> Self {
+        Self {
+            manoeuvre: levels.name.clone(),
+            simulated_s: levels.simulated_s,
+            model_software: levels.model_software,
+            software_processor: levels.software_processor,
+            double_precision_different_duties: levels.double_precision.different_duties,
+            double_precision_worst_counts: levels.double_precision.worst_counts,
+            agree: levels.agree(),
+            times_real_time: levels.speed(),
+        }
+    }
+}
+
+fn show(driven: &[Summary], link: LinkKind) {
+    println!(
+        "{:38} {:>7} {:>9} {:>15} {:>15} {:>15} {:>7}",
+        "manoeuvre", "s", "duties", "model=software", "software=PIL", "f64 would be", "speed"
+    );
+    for summary in driven {
+        let other = summary.double_precision_different_duties;
+        let double = match other {
+            0 => "the same".into(),
+            _ => format!("{other}, <= {}", summary.double_precision_worst_counts),
+        };
+        println!(
+            "{:38} {:7.2} {:9} {:>15} {:>15} {:>15} {:>5.1} x",
+            summary.manoeuvre,
+            summary.simulated_s,
+            summary.software_processor.duties,
+            words(&summary.model_software),
+            words(&summary.software_processor),
+            double,
+            summary.times_real_time
+        );
+    }
+    println!(
+        "duties and actuator frames, bit for bit; `f64 would be`: duty codes of an ECU in f64 that differ, and by how many counts"
+    );
+    println!(
+        "not compared: costs and times (the emulator counts instructions), the log, and the vehicle, which is the same code at \
+         every level; the model level has no frame checks, so no warnings"
+    );
+    if link == LinkKind::Uart {
+        println!("link: the board's UART, framed");
+    }
+}
+
+fn words(comparison: &Comparison) -> String {
+    if comparison.is_equal() {
+        return "equal".into();
+    }
+    let different = comparison.different_duties + comparison.different_frames;
+    match comparison.first {
+        Some(period) => format!("{different} from {period}"),
+        None => format!("{} missing", comparison.unmatched),
+    }
+}
+
+fn replay(file: &Path) -> anyhow::Result<Done> {
+    let name = file.display();
+    let bytes = std::fs::read(file).with_context(|| format!("cannot read {name}"))?;
+    let recording = Recording::read(&bytes).with_context(|| name.to_string())?;
+    let replayed = recording.replay().with_context(|| name.to_string())?;
+    let comparison = compare(&recording.exchanges, &replayed, Depth::Bytes);
+    println!(
+        "{} duties and {} actuator frames replayed: {}",
+        comparison.duties,
+        comparison.frames,
+        words(&comparison)
+    );
+    Ok(if comparison.is_equal() {
+        Done::Well
+    } else {
+        Done::Failed
+    })
+}
