@@ -3,10 +3,11 @@
 
 use crate::board::{Board, Current};
 use crate::exit::ExitCode;
-use crate::link::Link;
+use crate::link::{Link, Pace};
 use crate::{app, fault, tasks};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
+use cortex_m::peripheral::SCB;
 use critical_section::Mutex;
 use embedded_hal::pwm::SetDutyCycle;
 use shared_model::Scenario;
@@ -32,6 +33,8 @@ pub struct PwmInterrupt {
     pub frame: Option<FrameBytes>,
     /// The independent clock at the last control tick, counts.
     pub last_tick_counts: u32,
+    /// Counts of that clock in a control tick at the host's pace.
+    pub nominal_counts: u32,
 }
 
 /// What the control interrupt works on.
@@ -84,9 +87,13 @@ impl PwmInterrupt {
 
     fn call_control(&mut self) {
         let now = Current::cost_counter();
+        let elapsed_counts = match self.link.pace {
+            Pace::Host => self.nominal_counts,
+            Pace::Timer => now.wrapping_sub(self.last_tick_counts),
+        };
         let input = ControlInput {
             frame: self.frame.take(),
-            elapsed_counts: now.wrapping_sub(self.last_tick_counts),
+            elapsed_counts,
             found_by_pwm: self.task.faults(),
         };
         self.last_tick_counts = now;
@@ -114,6 +121,7 @@ impl ControlInterrupt {
 pub fn run(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode {
     let period = ecu.pwm.neutral().period();
     let tick_s = 1.0 / scenario.run.control_rate_hz;
+    let pace = link.pace;
     app::start(period, scenario, tick_s, |pwm| {
         let pwm = PwmInterrupt {
             task: ecu.pwm,
@@ -121,6 +129,7 @@ pub fn run(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode {
             link,
             frame: None,
             last_tick_counts: Current::cost_counter(),
+            nominal_counts: (Current::COST_CLOCK_HZ as f32 * tick_s) as u32,
         };
         let control = ControlInterrupt { task: ecu.control };
         (
@@ -128,6 +137,9 @@ pub fn run(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode {
             tasks::ControlInterrupt::InLoop(control),
         )
     });
+    if pace == Pace::Host {
+        Current::stop_pwm_interrupt();
+    }
     let mut ticks_seen = 0;
     while !tasks::is_finished() {
         let ticks = CONTROL_TICKS.load(Ordering::Relaxed);
@@ -135,7 +147,10 @@ pub fn run(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode {
             ticks_seen = ticks;
             Current::feed_watchdog();
         }
-        Current::idle();
+        match pace {
+            Pace::Host => SCB::set_pendst(),
+            Pace::Timer => Current::idle(),
+        }
     }
     Current::neutralise_pwm();
     app::conclude(0)

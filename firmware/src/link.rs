@@ -12,16 +12,27 @@ const TO_ECU: &str = "to-ecu";
 const PATIENCE_POLLS: u32 = 400_000_000;
 
 /// A link, open.
-pub enum Link {
-    /// The emulator's files: the fast one. The core stands still while the host answers.
-    Files {
-        /// To the host.
-        to_host: HostFile,
-        /// From the host.
-        to_ecu: HostFile,
-    },
-    /// A UART: framed bytes, each with the time that the emulator takes for it.
+pub struct Link {
+    transport: Transport,
+    /// Who says when a PWM period begins.
+    pub pace: Pace,
+}
+
+enum Transport {
+    /// The emulator's files. The core stands still while the host answers.
+    Files { to_host: HostFile, to_ecu: HostFile },
+    /// A UART: framed bytes.
     Uart(Deframer),
+}
+
+/// Who says when a PWM period begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pace {
+    /// The host: a period begins when the last one is answered, and each takes its nominal time. The emulator then has no time
+    /// to pass.
+    Host,
+    /// The board's timer, by whose clock the gate measures the control ticks.
+    Timer,
 }
 
 /// The host does not answer, or not as it should.
@@ -29,45 +40,52 @@ pub enum Link {
 pub struct LinkLost;
 
 impl Link {
-    /// Opens the link of that name, `files` or `uart`.
+    /// Opens the link of that name: `files` (the emulator's files, at the host's pace), `timed` (the same at the timer's), or
+    /// `uart` (at the host's).
     ///
     /// # Errors
     /// If there is none of that name, or the host has not opened its end.
     pub fn open(name: &str) -> Result<Self, LinkLost> {
-        match name {
-            "files" => Ok(Self::Files {
-                to_host: HostFile::create(TO_HOST).map_err(|_| LinkLost)?,
-                to_ecu: HostFile::open(TO_ECU).map_err(|_| LinkLost)?,
-            }),
-            "uart" => {
-                Current::open_uart();
-                Ok(Self::Uart(Deframer::new()))
-            }
-            _ => Err(LinkLost),
-        }
+        let (transport, pace) = match name {
+            "files" => (Transport::files()?, Pace::Host),
+            "timed" => (Transport::files()?, Pace::Timer),
+            "uart" => (Transport::uart(), Pace::Host),
+            _ => return Err(LinkLost),
+        };
+        Ok(Self { transport, pace })
     }
 
-    /// Sends and waits for the answer. No time passes for the ECU meanwhile: its clock, its watchdog and its PWM interrupt
-    /// wait with it.
+    /// Sends and waits for the answer.
     ///
     /// # Errors
     /// If no answer comes, or a damaged one.
     pub fn exchange(&mut self, sent: &ToHost) -> Result<ToEcu, LinkLost> {
         let mut answer = [0; TO_ECU_LEN];
-        match self {
-            Self::Files { to_host, to_ecu } => {
+        match &mut self.transport {
+            Transport::Files { to_host, to_ecu } => {
                 to_host.write(&sent.encode()).map_err(|_| LinkLost)?;
                 to_ecu.read(&mut answer).map_err(|_| LinkLost)?;
             }
-            Self::Uart(deframer) => {
-                Current::pause_time();
+            Transport::Uart(deframer) => {
                 serial::frame(&sent.encode(), Current::uart_send);
-                let received = receive(deframer, &mut answer);
-                Current::resume_time();
-                received?;
+                receive(deframer, &mut answer)?;
             }
         }
         Ok(ToEcu::decode(&answer))
+    }
+}
+
+impl Transport {
+    fn files() -> Result<Self, LinkLost> {
+        Ok(Self::Files {
+            to_host: HostFile::create(TO_HOST).map_err(|_| LinkLost)?,
+            to_ecu: HostFile::open(TO_ECU).map_err(|_| LinkLost)?,
+        })
+    }
+
+    fn uart() -> Self {
+        Current::open_uart();
+        Self::Uart(Deframer::new())
     }
 }
 
@@ -76,6 +94,8 @@ fn receive(deframer: &mut Deframer, answer: &mut [u8; TO_ECU_LEN]) -> Result<(),
     while polls < PATIENCE_POLLS {
         let Some(byte) = Current::uart_receive() else {
             polls += 1;
+            // Not late: the host is the clock.
+            Current::feed_watchdog();
             continue;
         };
         match deframer.push(byte) {

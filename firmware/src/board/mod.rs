@@ -69,12 +69,6 @@ pub trait Board {
     /// The next byte from it, if there is one.
     fn uart_receive() -> Option<u8>;
 
-    /// Stops the PWM interrupt, the counter of [`cost_counter`](Self::cost_counter) and, where it can be, the watchdog, so that an
-    /// ECU can wait for a host on the UART without ageing.
-    fn pause_time();
-
-    /// Goes on after [`pause_time`](Self::pause_time), the PWM interrupt with a whole period.
-    fn resume_time();
     /// Passes time until there may be something to do.
     fn idle() {
         cortex_m::asm::wfi();

@@ -16,21 +16,3 @@ pub fn stop() {
     // SAFETY: a write to one register of SysTick, which only this module uses.
     unsafe { (*SYST::PTR).csr.write(0) };
 }
-
-/// Enable bit of the control register.
-const ENABLE: u32 = 1;
-
-/// Stops the calls for a while.
-pub fn pause() {
-    // SAFETY: a write to one register of SysTick, which only this module uses.
-    unsafe { (*SYST::PTR).csr.modify(|bits| bits & !ENABLE) };
-}
-
-/// Goes on after [`pause`], with a whole period.
-pub fn resume() {
-    // SAFETY: as above; any value written to the counter clears it.
-    unsafe {
-        (*SYST::PTR).cvr.write(0);
-        (*SYST::PTR).csr.modify(|bits| bits | ENABLE);
-    }
-}

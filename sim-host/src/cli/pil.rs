@@ -287,9 +287,15 @@ fn show(driven: &[Summary], link: LinkKind) {
         "not compared: costs and times (the emulator counts instructions), the log, and the vehicle, which is the same code at \
          every level; the model level has no frame checks, so no warnings"
     );
-    if link == LinkKind::Uart {
-        println!("link: the board's UART, framed");
-    }
+    println!(
+        "PIL: {}",
+        match link {
+            LinkKind::Files =>
+                "over pipes; the host is the clock, each control tick takes its nominal time",
+            LinkKind::Timed => "over pipes; the board's timers are the clock",
+            LinkKind::Uart => "over the board's UART, framed; the host is the clock",
+        }
+    );
 }
 
 fn words(comparison: &Comparison) -> String {

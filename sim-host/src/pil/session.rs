@@ -23,9 +23,11 @@ const POLL: Duration = Duration::from_millis(2);
 /// What carries the exchange.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum LinkKind {
-    /// Pipes, read and written by the emulator: fast.
+    /// Pipes, read and written by the emulator; the host says when a PWM period begins: fast.
     Files,
-    /// The board's UART, framed: realistic and slow.
+    /// The same, but the board's timer says when a PWM period begins, and the gate measures the time between control ticks.
+    Timed,
+    /// The board's UART, framed, at the host's pace: realistic and slow.
     Uart,
 }
 
@@ -33,6 +35,7 @@ impl LinkKind {
     fn setting(self) -> &'static str {
         match self {
             Self::Files => "link=files",
+            Self::Timed => "link=timed",
             Self::Uart => "link=uart",
         }
     }
@@ -88,7 +91,7 @@ impl Session {
         let socket = directory.path().join(UART_SOCKET);
         let line = format!("unix:{},server=on,wait=on", socket.display());
         let serial = match link {
-            LinkKind::Files => qemu::SILENT.to_vec(),
+            LinkKind::Files | LinkKind::Timed => qemu::SILENT.to_vec(),
             LinkKind::Uart => machine.serial_options(&line),
         };
         let waiting = prepare(link, directory.path())?;
@@ -209,7 +212,7 @@ enum Waiting {
 
 fn prepare(link: LinkKind, directory: &Path) -> Result<Waiting, RunError> {
     match link {
-        LinkKind::Files => {
+        LinkKind::Files | LinkKind::Timed => {
             for name in [TO_HOST, TO_ECU] {
                 make_pipe(&directory.join(name))?;
             }

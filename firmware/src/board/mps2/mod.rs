@@ -5,7 +5,7 @@
 use super::{Board, BoardError, systick};
 use core::convert::Infallible;
 use core::ptr::{read_volatile, write_volatile};
-use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU16, Ordering};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 
 /// Clock of the core, SysTick and the APB timers, Hz.
@@ -19,9 +19,8 @@ const INSTRUCTION_RATE_HZ: u32 = 31_250_000;
 const TIMER0_CTRL: *mut u32 = 0x4000_0000 as *mut u32;
 const TIMER0_VALUE: *mut u32 = 0x4000_0004 as *mut u32;
 const TIMER0_RELOAD: *mut u32 = 0x4000_0008 as *mut u32;
-/// CMSDK watchdog: load, value, control, interrupt-clear and lock registers.
+/// CMSDK watchdog: load, control, interrupt-clear and lock registers.
 const WATCHDOG_LOAD: *mut u32 = 0x4000_8000 as *mut u32;
-const WATCHDOG_VALUE: *mut u32 = 0x4000_8004 as *mut u32;
 const WATCHDOG_CTRL: *mut u32 = 0x4000_8008 as *mut u32;
 const WATCHDOG_INTCLR: *mut u32 = 0x4000_800C as *mut u32;
 const WATCHDOG_LOCK: *mut u32 = 0x4000_8C00 as *mut u32;
@@ -42,10 +41,6 @@ const UART_LEAST_DIVIDER: u32 = 16;
 
 static DUTY: AtomicU16 = AtomicU16::new(0);
 static PERIOD: AtomicU16 = AtomicU16::new(0);
-/// Counts that the watchdog is fed with.
-static WATCHDOG_FEED: AtomicU32 = AtomicU32::new(u32::MAX);
-/// Counts that the watchdog has left while time is paused.
-static WATCHDOG_LEFT: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// The board.
 pub struct Mps2;
@@ -109,12 +104,10 @@ impl Board for Mps2 {
     }
 
     fn start_watchdog(timeout_ms: u32) {
-        let counts = timeout_ms * (CLOCK_HZ / 1000);
-        WATCHDOG_FEED.store(counts, Ordering::Relaxed);
         // SAFETY: writes to registers of the watchdog, which nothing else uses.
         unsafe {
             write_volatile(WATCHDOG_LOCK, WATCHDOG_UNLOCK_KEY);
-            write_volatile(WATCHDOG_LOAD, counts);
+            write_volatile(WATCHDOG_LOAD, timeout_ms * (CLOCK_HZ / 1000));
             write_volatile(WATCHDOG_CTRL, WATCHDOG_INTERRUPT);
         }
     }
@@ -129,7 +122,8 @@ impl Board for Mps2 {
     }
 
     fn feed_watchdog() {
-        load_watchdog(WATCHDOG_FEED.load(Ordering::Relaxed));
+        // SAFETY: a write to the watchdog's clear register, which reloads its counter.
+        unsafe { write_volatile(WATCHDOG_INTCLR, 1) };
     }
 
     fn open_uart() {
@@ -154,34 +148,5 @@ impl Board for Mps2 {
             let is_full = read_volatile(UART1_STATE) & UART_RX_FULL != 0;
             is_full.then(|| read_volatile(UART1_DATA) as u8)
         }
-    }
-
-    fn pause_time() {
-        systick::pause();
-        // SAFETY: writes to control registers of timer and watchdog, which only this module uses.
-        unsafe {
-            write_volatile(TIMER0_CTRL, 0);
-            // Its counter goes on all the same; what it has left is put back in the end.
-            write_volatile(WATCHDOG_CTRL, 0);
-            WATCHDOG_LEFT.store(read_volatile(WATCHDOG_VALUE), Ordering::Relaxed);
-        }
-    }
-
-    fn resume_time() {
-        load_watchdog(WATCHDOG_LEFT.load(Ordering::Relaxed));
-        // SAFETY: as above.
-        unsafe {
-            write_volatile(TIMER0_CTRL, 1);
-            write_volatile(WATCHDOG_CTRL, WATCHDOG_INTERRUPT);
-        }
-        systick::resume();
-    }
-}
-
-fn load_watchdog(counts: u32) {
-    // SAFETY: writes to registers of the watchdog. The second takes back an expiry and reloads the counter.
-    unsafe {
-        write_volatile(WATCHDOG_LOAD, counts);
-        write_volatile(WATCHDOG_INTCLR, 1);
     }
 }

@@ -138,16 +138,4 @@ impl Board for NetduinoPlus2 {
         let is_full = uart.sr().read().rxne().bit_is_set();
         is_full.then(|| uart.dr().read().dr().bits() as u8)
     }
-
-    fn pause_time() {
-        systick::pause();
-        // SAFETY: nothing else uses the timer. The watchdog cannot be stopped.
-        unsafe { (*pac::TIM2::ptr()).cr1().write(|w| w.cen().disabled()) };
-    }
-
-    fn resume_time() {
-        // SAFETY: as above.
-        unsafe { (*pac::TIM2::ptr()).cr1().write(|w| w.cen().enabled()) };
-        systick::resume();
-    }
 }

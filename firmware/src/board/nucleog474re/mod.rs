@@ -116,16 +116,4 @@ impl Board for NucleoG474re {
         let is_full = uart.isr().read().rxne().bit_is_set();
         is_full.then(|| uart.rdr().read().bits() as u8)
     }
-
-    fn pause_time() {
-        systick::pause();
-        // SAFETY: nothing else uses the timer. The watchdog cannot be stopped.
-        unsafe { (*pac::TIM2::ptr()).cr1().write(|w| w.cen().clear_bit()) };
-    }
-
-    fn resume_time() {
-        // SAFETY: as above.
-        unsafe { (*pac::TIM2::ptr()).cr1().write(|w| w.cen().set_bit()) };
-        systick::resume();
-    }
 }
