@@ -9,7 +9,9 @@ use shared_model::serial::{self, Deframer};
 const TO_HOST: &str = "to-host";
 const TO_ECU: &str = "to-ecu";
 /// Polls of an empty UART after which the host counts as gone: some seconds of an emulator.
-const PATIENCE_POLLS: u32 = 400_000_000;
+const PATIENCE_POLLS: u32 = 10_000_000;
+/// Clocks between two polls: without them an emulator has its hands full with the polls, and none for the bytes.
+const POLL_CLOCKS: u32 = 1000;
 
 /// A link, open.
 pub struct Link {
@@ -94,6 +96,7 @@ fn receive(deframer: &mut Deframer, answer: &mut [u8; TO_ECU_LEN]) -> Result<(),
     while polls < PATIENCE_POLLS {
         let Some(byte) = Current::uart_receive() else {
             polls += 1;
+            cortex_m::asm::delay(POLL_CLOCKS);
             // Not late: the host is the clock.
             Current::feed_watchdog();
             continue;

@@ -1,0 +1,221 @@
+//! The firmware in the loop: the same commands as the program on the host, over every link and on every board that the emulator
+//! has, twice the same bytes, and a clear end where the firmware is dead.
+
+// The links are local pipes and sockets.
+#![cfg(unix)]
+
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use shared_model::frame::decode_actuation;
+use shared_model::signal::Mode;
+use sim_host::closed_loop::drive::{Drive, ecu_scenario};
+use sim_host::closed_loop::ecu::Software;
+use sim_host::closed_loop::levels::{Levels, ProcessorRun, Target, drive, on_processor};
+use sim_host::closed_loop::manoeuvre::{Manoeuvre, load};
+use sim_host::closed_loop::recording::Recording;
+use sim_host::closed_loop::run::{Depth, compare, run};
+use sim_host::pil::qemu::{Machine, RunError};
+use sim_host::pil::session::{LinkKind, Session};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tests::{board_image, image};
+
+fn manoeuvres() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/manoeuvres")
+}
+
+/// A manoeuvre's first `duration_s`, s.
+fn manoeuvre(file: &str, duration_s: f64) -> (Scenario<f64>, Manoeuvre) {
+    let (mut scenario, manoeuvre) = load(&manoeuvres().join(file)).expect("the example is valid");
+    scenario.run.duration_s = duration_s;
+    (scenario, manoeuvre)
+}
+
+fn target(machine: Machine, link: LinkKind) -> Target {
+    Target {
+        image: board_image(machine.board(), "ecu"),
+        machine,
+        link,
+        time_out: Duration::from_secs(60),
+    }
+}
+
+fn levels(file: &str, duration_s: f64, machine: Machine, link: LinkKind) -> Levels {
+    let (mut scenario, manoeuvre) = manoeuvre(file, duration_s);
+    scenario.servo.timer_clock_hz = machine.timer_clock_hz();
+    let target = target(machine, link);
+    drive(&scenario, &manoeuvre, &target, || {}).unwrap_or_else(|error| panic!("{file}: {error}"))
+}
+
+fn on_target(link: LinkKind) -> ProcessorRun {
+    let (scenario, manoeuvre) = manoeuvre("low-resolution-noise.toml", 1.0);
+    let drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
+    let ecu = ecu_scenario(&scenario, &manoeuvre);
+    let target = target(Machine::Mps2An386, link);
+    on_processor(&ecu, drive, &target, || {}).unwrap_or_else(|error| panic!("{error}"))
+}
+
+fn assert_agree(levels: &Levels) {
+    let name = &levels.name;
+    assert!(
+        levels.model_software.is_equal(),
+        "{name}: {:?}",
+        levels.model_software
+    );
+    assert!(
+        levels.software_processor.is_equal(),
+        "{name}: {:?}",
+        levels.software_processor
+    );
+    let last = levels
+        .processor
+        .run
+        .actuations
+        .last()
+        .expect("there are ticks");
+    let last = last.expect("the ECU has told");
+    assert_eq!(
+        (last.mode, last.faults),
+        (Mode::Active, 0),
+        "{name}: a false alarm"
+    );
+}
+
+/// Until the dither has come in, or longer where more happens later.
+#[test]
+fn every_manoeuvre_gives_the_same_commands_at_every_level() {
+    let mut files = 0;
+    for entry in std::fs::read_dir(manoeuvres())
+        .expect("the folder is there")
+        .flatten()
+    {
+        let file = entry.file_name().to_string_lossy().into_owned();
+        if !file.ends_with(".toml") {
+            continue;
+        }
+        let duration_s = if file == "speed-ramp.toml" { 12.0 } else { 5.0 };
+        let levels = levels(&file, duration_s, Machine::Mps2An386, LinkKind::Files);
+        assert_agree(&levels);
+        assert!(levels.software_processor.duties as f64 >= duration_s * 1e4);
+        assert!(levels.software_processor.frames as f64 >= duration_s * 1e3 - 1.0);
+        files += 1;
+    }
+    assert!(files >= 8, "{files} manoeuvres");
+}
+
+#[test]
+fn every_link_and_board_gives_the_same_commands() {
+    let file = "constant-speed-sine.toml";
+    for (machine, link) in [
+        (Machine::Mps2An386, LinkKind::Timed),
+        (Machine::Mps2An500, LinkKind::Files),
+        (Machine::NetduinoPlus2, LinkKind::Files),
+    ] {
+        assert_agree(&levels(file, 4.0, machine, link));
+    }
+}
+
+/// Some hundred exchanges: each takes the emulator a millisecond.
+#[test]
+fn the_uart_carries_the_same_commands() {
+    let mut scenario = Scenario::reconstruction();
+    scenario.run.duration_s = 0.05;
+    scenario.dither.waveform = Waveform::Square;
+    scenario.dither.start_time_s = 0.0;
+    // A small request, so that the lead-in is short.
+    let manoeuvre = Manoeuvre::constant(1750.0, 0.1);
+    let target = target(Machine::Mps2An386, LinkKind::Uart);
+    let levels = drive(&scenario, &manoeuvre, &target, || {}).expect("it can be driven");
+    assert_agree(&levels);
+}
+
+#[test]
+fn two_runs_and_a_replay_give_the_same_bytes() {
+    let (first, second) = (on_target(LinkKind::Files), on_target(LinkKind::Files));
+    assert_eq!(first.run.exchanges, second.run.exchanges);
+    assert_eq!(
+        first.costs, second.costs,
+        "also every instruction is the same"
+    );
+
+    let (scenario, manoeuvre) = manoeuvre("low-resolution-noise.toml", 1.0);
+    let recording = Recording {
+        scenario: ecu_scenario(&scenario, &manoeuvre),
+        exchanges: first.run.exchanges,
+    };
+    let mut bytes = Vec::new();
+    recording.write(&mut bytes).expect("a buffer takes it");
+    let read = Recording::read(&bytes).expect("it is whole");
+    assert_eq!(read, recording);
+    let replayed = read.replay().expect("the scenario is valid");
+    assert_eq!(replayed, recording.exchanges);
+}
+
+#[test]
+fn one_changed_bit_of_a_command_is_seen() {
+    let (scenario, manoeuvre) = manoeuvre("constant-speed.toml", 0.2);
+    let mut ecu = Software::new(&ecu_scenario(&scenario, &manoeuvre)).expect("it is valid");
+    let drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
+    let exchanges = run(&mut ecu, drive, || {})
+        .expect("it runs on the host")
+        .exchanges;
+    let with_frame = exchanges
+        .iter()
+        .rposition(|one| one.from_ecu.frame.is_some());
+    let at = with_frame.expect("there are frames");
+    for bit in 0..8 * 24 {
+        let mut changed = exchanges.clone();
+        let frame = changed[at].from_ecu.frame.as_mut().expect("as found above");
+        frame[bit / 8] ^= 1 << (bit % 8);
+        let comparison = compare(&exchanges, &changed, Depth::Bytes);
+        assert_eq!(
+            (comparison.first, comparison.different_frames),
+            (Some(at), 1)
+        );
+    }
+    let mut changed = exchanges.clone();
+    changed[7].from_ecu.duty_code ^= 1;
+    assert_eq!(
+        compare(&exchanges, &changed, Depth::Commands).first,
+        Some(7)
+    );
+    changed.truncate(100);
+    assert!(!compare(&exchanges[..7], &changed[..8], Depth::Bytes).is_equal());
+    // What the ECU told at that frame is readable: the comparison is not one of zeros.
+    let frame = exchanges[at].from_ecu.frame.expect("as found above");
+    assert!(
+        decode_actuation(&frame)
+            .expect("a known mode")
+            .motor_voltage_v
+            > 2.9
+    );
+}
+
+#[test]
+fn a_firmware_that_dies_or_refuses_is_said() {
+    let (scenario, manoeuvre) = manoeuvre("constant-speed.toml", 0.2);
+    let ecu = ecu_scenario(&scenario, &manoeuvre);
+    let start = |name: &str, settings: &[String]| {
+        let limit = Duration::from_secs(3);
+        let machine = Machine::Mps2An386;
+        Session::start(&image(name), machine, settings, LinkKind::Files, &[], limit)
+    };
+    let refused = start("ecu", &["dither.amplitude_v=-1".into()]);
+    let message = refused.err().expect("it is refused").to_string();
+    assert!(message.contains("exit code 10"), "{message}");
+    assert!(message.contains("dither.amplitude_v"), "{message}");
+
+    // An image that never opens the link.
+    let silent = start("fault-drill", &["hang".into()]).err();
+    assert!(
+        matches!(silent, Some(RunError::TimedOut { .. })),
+        "{silent:?}"
+    );
+
+    // The host that stops answering is noticed when the pipes close; the emulator ends with the session.
+    let settings = sim_host::pil::settings::of(&ecu);
+    let mut session = start("ecu", &settings).expect("it starts");
+    session.receive().expect("the first period");
+    let error = session.receive().expect_err("it waits for its answer");
+    assert!(matches!(error, RunError::TimedOut { .. }), "{error}");
+}
