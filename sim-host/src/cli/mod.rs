@@ -129,10 +129,23 @@ pub fn main() -> ExitCode {
         Ok(Done::Failed) => ExitCode::from(FAILED),
         Ok(Done::Code(code)) => ExitCode::from(code),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            eprintln!("error: {}", message(&error));
             ExitCode::from(COULD_NOT_RUN)
         }
     }
+}
+
+/// The error and its causes, each once: some say their cause themselves, others leave that to the chain.
+fn message(error: &anyhow::Error) -> String {
+    let mut message = String::new();
+    for cause in error.chain().map(ToString::to_string) {
+        if message.is_empty() {
+            message = cause;
+        } else if !message.contains(&cause) {
+            message = format!("{message}: {cause}");
+        }
+    }
+    message
 }
 
 /// Where a scenario's parameters come from.

@@ -89,13 +89,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     if let Some(file) = &arguments.replay {
         return replay(file);
     }
+    let time_out = time_out(arguments.time_out)?;
     let manoeuvres = arguments.manoeuvres()?;
     arguments.check_outputs(manoeuvres.len())?;
     let target = Target {
         image: Image::open(&arguments.firmware)?,
         machine: arguments.machine,
         link: arguments.link,
-        time_out: time_out(arguments.time_out)?,
+        time_out,
     };
     let mut driven = Vec::new();
     for (scenario, manoeuvre) in &manoeuvres {
