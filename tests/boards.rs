@@ -1,8 +1,5 @@
 //! The same ECU on other boards: an STM32F405 whose timer is looked at from outside, and the images of all boards.
 
-// The emulator is steered over local sockets.
-#![cfg(unix)]
-
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;

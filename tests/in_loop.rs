@@ -1,9 +1,6 @@
 //! The firmware in the loop: the same commands as the program on the host, over every link and on every board that the emulator
 //! has, twice the same bytes, and a clear end where the firmware is dead.
 
-// The links are local pipes and sockets.
-#![cfg(unix)]
-
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::frame::decode_actuation;

@@ -39,6 +39,8 @@ pub fn run() -> ExitCode {
 }
 
 /// The vehicle model runs on the ECU.
+// Out of line, as is the other: the stack need not hold what only one of them needs.
+#[inline(never)]
 fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>) -> ExitCode {
     let ecu = match OpenLoop::new(scenario) {
         Ok(ecu) => ecu,
@@ -60,6 +62,7 @@ fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>) -> ExitCode {
 }
 
 /// The ECU steers a vehicle on the other end of the link.
+#[inline(never)]
 fn steer(scenario: &Scenario<f32>, link: &str) -> ExitCode {
     let ecu = match Ecu::new(scenario, Current::COST_CLOCK_HZ) {
         Ok(ecu) => ecu,
@@ -148,14 +151,14 @@ pub fn start(
     period: u16,
     scenario: &Scenario<f32>,
     tick_s: f32,
-    tasks: impl FnOnce(<Current as Board>::Pwm) -> (PwmInterrupt, ControlInterrupt),
+    tasks: impl FnOnce(<Current as Board>::Pwm) -> Option<(PwmInterrupt, ControlInterrupt)>,
 ) {
     let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * tick_s) as u32;
     let samples_a_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
     critical_section::with(|_| {
         // Started once and with a period that the scenario's check has passed.
-        if let Ok(pwm) = Current::start_pwm(period) {
-            let (pwm, control) = tasks(pwm);
+        let pwm = Current::start_pwm(period).ok();
+        if let Some((pwm, control)) = pwm.and_then(tasks) {
             tasks::hand_over(pwm, control, samples_a_ms);
         }
         set_priorities();

@@ -123,19 +123,20 @@ pub fn run(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode {
     let tick_s = 1.0 / scenario.run.control_rate_hz;
     let pace = link.pace;
     app::start(period, scenario, tick_s, |pwm| {
-        let pwm = PwmInterrupt {
+        let pwm = cortex_m::singleton!(: PwmInterrupt = PwmInterrupt {
             task: ecu.pwm,
             pwm,
             link,
             frame: None,
             last_tick_counts: Current::cost_counter(),
             nominal_counts: (Current::COST_CLOCK_HZ as f32 * tick_s) as u32,
-        };
-        let control = ControlInterrupt { task: ecu.control };
-        (
+        })?;
+        let control =
+            cortex_m::singleton!(: ControlInterrupt = ControlInterrupt { task: ecu.control })?;
+        Some((
             tasks::PwmInterrupt::InLoop(pwm),
             tasks::ControlInterrupt::InLoop(control),
-        )
+        ))
     });
     if pace == Pace::Host {
         Current::stop_pwm_interrupt();

@@ -98,23 +98,24 @@ pub fn run(
     else {
         return Ok(ExitCode::TelemetryFailed);
     };
-    let control = ControlInterrupt {
-        task: ecu.control,
-        records,
-        steps: scenario.steps(),
-        index: 0,
-    };
     let period = neutral.period();
-    let task = ecu.pwm;
+    let (task, control) = (ecu.pwm, ecu.control);
     app::start(period, scenario, scenario.step_s(), |pwm| {
-        (
-            tasks::PwmInterrupt::OpenLoop(PwmInterrupt {
-                task,
-                pwm,
-                recording,
-            }),
+        let pwm = cortex_m::singleton!(: PwmInterrupt = PwmInterrupt {
+            task,
+            pwm,
+            recording,
+        })?;
+        let control = cortex_m::singleton!(: ControlInterrupt = ControlInterrupt {
+            task: control,
+            records,
+            steps: scenario.steps(),
+            index: 0,
+        })?;
+        Some((
+            tasks::PwmInterrupt::OpenLoop(pwm),
             tasks::ControlInterrupt::OpenLoop(control),
-        )
+        ))
     });
 
     while !tasks::is_finished() {

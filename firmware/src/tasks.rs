@@ -24,20 +24,20 @@ static SAMPLES_A_MS: AtomicU32 = AtomicU32::new(1);
 static PWM_START: Mutex<Cell<Option<PwmInterrupt>>> = Mutex::new(Cell::new(None));
 static CONTROL_START: Mutex<Cell<Option<ControlInterrupt>>> = Mutex::new(Cell::new(None));
 
-/// What the PWM interrupt works on.
+/// What the PWM interrupt works on. By reference: the interrupts' stacks have no room for moving it.
 pub enum PwmInterrupt {
     /// The vehicle model runs on the ECU.
-    OpenLoop(open_loop::PwmInterrupt),
+    OpenLoop(&'static mut open_loop::PwmInterrupt),
     /// The ECU steers a vehicle.
-    InLoop(in_loop::PwmInterrupt),
+    InLoop(&'static mut in_loop::PwmInterrupt),
 }
 
 /// What the control interrupt works on.
 pub enum ControlInterrupt {
     /// The vehicle model runs on the ECU.
-    OpenLoop(open_loop::ControlInterrupt),
+    OpenLoop(&'static mut open_loop::ControlInterrupt),
     /// The ECU steers a vehicle.
-    InLoop(in_loop::ControlInterrupt),
+    InLoop(&'static mut in_loop::ControlInterrupt),
 }
 
 /// Hands the tasks to their interrupts, which take them at their first call.

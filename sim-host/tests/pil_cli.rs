@@ -1,7 +1,5 @@
 //! `sim-host pil`, as a user meets it without an emulator: bad input, and recordings that are none.
 
-#![cfg(unix)]
-
 use shared_model::Scenario;
 use sim_host::closed_loop::drive::{Drive, ecu_scenario};
 use sim_host::closed_loop::ecu::Software;

@@ -11,7 +11,6 @@ mod nonlinearity;
 mod orbit;
 mod output;
 mod phase;
-#[cfg(unix)]
 mod pil;
 mod poincare;
 mod qemu;
@@ -55,7 +54,6 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Verify(verify::Arguments),
-    #[cfg(unix)]
     Pil(pil::Arguments),
     Simulate(simulate::Arguments),
     Reproduce(reproduce::Arguments),
@@ -102,7 +100,6 @@ pub fn main() -> ExitCode {
     }
     let done = match command {
         Command::Verify(arguments) => verify::run(&arguments),
-        #[cfg(unix)]
         Command::Pil(arguments) => pil::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Reproduce(arguments) => reproduce::run(&arguments),

@@ -51,18 +51,12 @@ impl<'a> Output<'a> {
 }
 
 /// A temporary file beside the output, with the permissions that any new file has.
-#[cfg(unix)]
 fn temporary(folder: &Path) -> std::io::Result<NamedTempFile<File>> {
     use std::os::unix::fs::PermissionsExt;
     let any = std::fs::Permissions::from_mode(0o666);
     tempfile::Builder::new()
         .permissions(any)
         .tempfile_in(folder)
-}
-
-#[cfg(not(unix))]
-fn temporary(folder: &Path) -> std::io::Result<NamedTempFile<File>> {
-    NamedTempFile::new_in(folder)
 }
 
 /// Where an analysis writes its results. Without any, a summary is all there is.

@@ -242,6 +242,7 @@ struct Summary {
     double_precision_worst_counts: u16,
     agree: bool,
     times_real_time: f64,
+    firmware: String,
 }
 
 impl Summary {
@@ -255,6 +256,7 @@ impl Summary {
             double_precision_worst_counts: levels.double_precision.worst_counts,
             agree: levels.agree(),
             times_real_time: levels.speed(),
+            firmware: levels.processor.log.last().cloned().unwrap_or_default(),
         }
     }
 }
@@ -280,6 +282,9 @@ fn show(driven: &[Summary], link: LinkKind) {
             double,
             summary.times_real_time
         );
+    }
+    if let [only] = driven {
+        println!("firmware: {}", only.firmware);
     }
     println!(
         "duties and actuator frames, bit for bit; `f64 would be`: duty codes of an ECU in f64 that differ, and by how many counts"

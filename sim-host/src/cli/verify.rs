@@ -113,6 +113,7 @@ fn write_report(folder: &Path, verification: &Verification) -> anyhow::Result<()
         verdict: &verification.verdict,
         runs: &verification.runs,
         pairs: &verification.pairs,
+        drives: &verification.drives,
         notes: &verification.notes,
     };
     report::write(folder, &input)

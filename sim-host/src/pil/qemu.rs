@@ -2,7 +2,6 @@
 
 use crate::pil::elf::Image;
 use crate::pil::log::LogDecoder;
-#[cfg(unix)]
 pub use crate::pil::socket::SocketError;
 use std::io::Read;
 use std::path::Path;
@@ -130,7 +129,6 @@ pub enum RunError {
     #[error("cannot decode the firmware's log: {0:#}")]
     Log(anyhow::Error),
     /// The emulator cannot be watched or steered from outside.
-    #[cfg(unix)]
     #[error("cannot steer {PROGRAM}: {0}")]
     NotSteered(#[from] SocketError),
 }

@@ -13,6 +13,7 @@ mod text;
 pub use figure::drive::draw as drive;
 pub use figure::schedule_map::draw as schedule_map;
 
+use crate::closed_loop::run::Run;
 use crate::trace::Trace;
 use crate::verdict::Verdict;
 use anyhow::{Context, ensure};
@@ -57,6 +58,17 @@ pub struct Pair {
     pub after: usize,
 }
 
+/// What the report shows of a manoeuvre with the ECU in the loop.
+#[derive(Debug, Clone)]
+pub struct DriveReport {
+    /// Name for file names: lower case, digits and hyphens.
+    pub id: String,
+    /// Name for people.
+    pub title: String,
+    /// The firmware's run.
+    pub run: Run,
+}
+
 /// Everything that a report shows.
 #[derive(Debug, Clone, Copy)]
 pub struct ReportInput<'a> {
@@ -68,6 +80,8 @@ pub struct ReportInput<'a> {
     pub runs: &'a [RunReport],
     /// The runs to be shown before and after.
     pub pairs: &'a [Pair],
+    /// Manoeuvres with the ECU in the loop.
+    pub drives: &'a [DriveReport],
     /// Name and value of further facts: memory use, toolchain, revision.
     pub notes: &'a [(String, String)],
 }

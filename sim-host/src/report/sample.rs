@@ -95,6 +95,7 @@ pub fn input<'a>(
         verdict,
         runs,
         pairs,
+        drives: &[],
         notes: &NOTES,
     }
 }

@@ -2,12 +2,13 @@
 
 mod case;
 mod checks;
+mod in_loop;
 mod suppression;
 
 use crate::pil::elf::Image;
 use crate::pil::qemu::RunError;
 use crate::pil::telemetry::TelemetryError;
-use crate::report::{Pair, RunReport};
+use crate::report::{DriveReport, Pair, RunReport};
 use crate::verdict::{Check, Verdict};
 use case::{Outcome, Role};
 use rayon::prelude::*;
@@ -74,6 +75,14 @@ pub enum VerifyError {
         /// Why.
         source: TelemetryError,
     },
+    /// A manoeuvre could not be driven.
+    #[error("{title}: {source}")]
+    InLoop {
+        /// The manoeuvre.
+        title: String,
+        /// Why.
+        source: Box<crate::closed_loop::levels::LevelError>,
+    },
     /// No place for telemetry.
     #[error("cannot make a temporary folder: {0}")]
     Folder(std::io::Error),
@@ -88,6 +97,8 @@ pub struct Verification {
     pub runs: Vec<RunReport>,
     /// Runs before and after dither.
     pub pairs: Vec<Pair>,
+    /// Manoeuvres with the ECU in the loop.
+    pub drives: Vec<DriveReport>,
     /// Facts about image and runs.
     pub notes: Vec<(String, String)>,
 }
@@ -132,10 +143,13 @@ pub fn verify(
         checks.extend(checks::of(outcome));
     }
     checks.extend(suppression::checks(&outcomes));
+    let (in_loop, drives) = in_loop::run(options, &on_progress)?;
+    checks.extend(in_loop);
     checks.extend(checks::resources(&options.image, &outcomes));
     Ok(Verification {
         verdict: Verdict::over(checks),
         pairs: suppression::pairs(&outcomes),
+        drives,
         notes: checks::notes(&options.image, &outcomes),
         runs: outcomes.iter().map(Outcome::report).collect(),
     })

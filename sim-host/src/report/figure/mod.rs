@@ -82,6 +82,16 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
             .into(),
         svg: instructions::draw(input.runs)?,
     });
+    for driven in input.drives {
+        figures.push(Figure {
+            name: driven.id.clone(),
+            caption: format!(
+                "{}. The vehicle on the host, the ECU on the emulated target, one exchange a PWM period.",
+                driven.title
+            ),
+            svg: drive::draw(&driven.title, &driven.run)?,
+        });
+    }
     Ok(figures)
 }
 
