@@ -141,16 +141,30 @@ impl<T: Real> ControlTask<T> {
     pub fn run(&mut self, input: &ControlInput) -> ControlOutput<T> {
         let mut found_outside = input.found_by_pwm;
         found_outside.add_if(!self.channels.agrees(), Fault::ChannelsDiffer);
-        let [a, b] = self
+        let [(setpoint_a, told_a), (setpoint_b, told_b)] = self
             .channels
             .run(|channel| channel.run(input, found_outside));
-        ControlOutput {
-            setpoints: [a.0, b.0],
-            frame: encode_actuation(
-                &a.1.map(&|signal: T| signal.to_f64() as f32),
-                &mut self.sender,
+        let actuation = Actuation {
+            // The safe state judges nothing any more, so a limit that memory lost in one channel must not be told.
+            wheel_speed_limit_rpm: lower(
+                told_a.wheel_speed_limit_rpm,
+                told_b.wheel_speed_limit_rpm,
             ),
-            actuation: a.1,
+            ..told_a
+        };
+        let frame = encode_actuation(
+            &actuation.map(&|signal: T| signal.to_f64() as f32),
+            &mut self.sender,
+        );
+        ControlOutput {
+            setpoints: [setpoint_a, setpoint_b],
+            frame,
+            actuation,
         }
     }
+}
+
+/// The lower of two numbers, or the one that is finite.
+fn lower<T: Real>(a: T, b: T) -> T {
+    if b < a || !a.is_finite() { b } else { a }
 }

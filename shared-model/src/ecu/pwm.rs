@@ -22,13 +22,21 @@ struct Channel<T> {
     limiter: Limiter<T>,
     pwm: Pwm<T>,
     setpoint: Setpoint<T>,
+    periods_a_tick: u32,
+    periods_to_tick: u32,
 }
 
 impl<T: Real> Channel<T> {
-    fn duty(&mut self) -> Duty {
+    fn begin(&mut self) -> PwmPeriod {
         let sample: T = self.oscillator.sample();
         let dither_v = self.setpoint.dither_amplitude_v * sample;
-        self.pwm.duty(self.limiter.run(&self.setpoint, dither_v))
+        let duty = self.pwm.duty(self.limiter.run(&self.setpoint, dither_v));
+        self.periods_to_tick = self.periods_to_tick.saturating_sub(1);
+        let control_due = self.periods_to_tick == 0;
+        if control_due {
+            self.periods_to_tick = self.periods_a_tick;
+        }
+        PwmPeriod { duty, control_due }
     }
 }
 
@@ -37,8 +45,6 @@ impl<T: Real> Channel<T> {
 pub struct PwmTask<T> {
     channels: Duplex<Channel<T>>,
     neutral: Duty,
-    periods_a_tick: u32,
-    periods_to_tick: u32,
     faults: Faults,
 }
 
@@ -55,28 +61,25 @@ impl<T: Real> PwmTask<T> {
                 limiter: Limiter::new(scenario, neutral.code()),
                 pwm,
                 setpoint: Setpoint::neutral(),
+                periods_a_tick,
+                periods_to_tick: periods_a_tick,
             }),
             neutral,
-            periods_a_tick,
-            periods_to_tick: periods_a_tick,
             faults: Faults::NONE,
         }
     }
 
     /// Begins a PWM period.
     pub fn begin(&mut self) -> PwmPeriod {
-        let [a, b] = self.channels.run(Channel::duty);
+        let [a, b] = self.channels.run(Channel::begin);
         self.faults.add_if(a != b, Fault::ChannelsDiffer);
-        let duty = nearer(self.neutral, a, b);
+        let duty = median(self.neutral, a.duty, b.duty);
         self.channels
             .run(|channel| channel.limiter.expect(duty.code()));
-
-        self.periods_to_tick = self.periods_to_tick.saturating_sub(1);
-        let control_due = self.periods_to_tick == 0;
-        if control_due {
-            self.periods_to_tick = self.periods_a_tick;
+        PwmPeriod {
+            duty,
+            control_due: a.control_due || b.control_due,
         }
-        PwmPeriod { duty, control_due }
     }
 
     /// Takes over what the control task computed in the last tick; for use where a control tick is due.
@@ -114,8 +117,7 @@ impl<T: Real> PwmTask<T> {
     }
 }
 
-/// Of two duties the one nearer to neutral.
-fn nearer(neutral: Duty, a: Duty, b: Duty) -> Duty {
-    let distance = |duty: Duty| duty.code().abs_diff(neutral.code());
-    if distance(b) < distance(a) { b } else { a }
+/// Where the channels differ: of the two the duty nearer to neutral, and neutral itself if they lie on both sides of it.
+fn median(neutral: Duty, a: Duty, b: Duty) -> Duty {
+    neutral.max(a.min(b)).min(a.max(b))
 }
