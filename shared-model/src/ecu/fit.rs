@@ -6,6 +6,9 @@ use crate::parameter::OutOfRange;
 use crate::schedule::Table;
 use crate::{Real, Scenario};
 
+/// What a number may be off by the rounding of f32; the gate's own limits have the same room.
+const ROUNDING: f64 = 1e-6;
+
 /// Checks the numbers of a valid scenario against each other.
 ///
 /// # Errors
@@ -26,22 +29,22 @@ pub(super) fn check<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
 fn check_motor<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     let (policy, gate) = (&scenario.policy, &scenario.gate);
     let resistance_ohm = scenario.servo.winding_resistance_ohm;
-    // By voltages, as the winding may have no resistance.
-    let fits = |name, value: T, limit: T| {
-        if value * resistance_ohm <= limit {
-            return Ok(());
-        }
-        fits("policy", name, value, T::zero(), limit / resistance_ohm)
-    };
+    let a_per_v = T::from_f64(1.0 + ROUNDING) / resistance_ohm;
+    let most_a = gate.motor_voltage_v * a_per_v;
     fits(
+        "policy",
         "motor_current_a",
         policy.motor_current_a,
-        gate.motor_voltage_v,
+        T::zero(),
+        most_a,
     )?;
+    let fastest = gate.motor_slew_v_per_s * a_per_v;
     fits(
+        "policy",
         "motor_slew_a_per_s",
         policy.motor_slew_a_per_s,
-        gate.motor_slew_v_per_s,
+        T::zero(),
+        fastest,
     )
 }
 
