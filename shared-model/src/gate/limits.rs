@@ -4,7 +4,7 @@ use crate::Real;
 use crate::parameter::{Field, ParameterSet};
 
 /// What the gate lets through. The defaults hold every motion of the preset from 1200 to 1950 rpm, chaos included, with a
-/// margin of at least two.
+/// margin of 1.8 or more; `docs/design.md` has the measured extremes beside them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
