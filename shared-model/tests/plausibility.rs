@@ -6,7 +6,7 @@ use shared_model::signal::Measurement;
 
 const TICK_S: f32 = 1e-3;
 /// Of a wheel of 0.3 m, m/s at 1 rpm.
-const SPEED_PER_RPM: f32 = 0.031_415_927;
+const SPEED_PER_RPM: f32 = 0.031_415_93;
 
 type Signal = fn(&mut Measurement<f32>) -> &mut f32;
 const WHEEL_SPEED: Signal = |m| &mut m.wheel_speed_rpm;

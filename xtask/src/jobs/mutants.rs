@@ -98,9 +98,10 @@ fn mutate(pinned: &str, tools: &Path, results: &Path) -> Result<()> {
     for file in MUTATED {
         command.args(["--file", file]);
     }
-    command.args(["--", "--lib"]);
+    // To cargo's every call, so that no other test is even built.
+    command.arg("--cargo-arg=--lib");
     for test in TESTS {
-        command.args(["--test", test]);
+        command.arg(format!("--cargo-arg=--test={test}"));
     }
     let status = process::status(&mut command)?;
     if status.code().is_some_and(|code| JUDGED.contains(&code)) {
