@@ -5,11 +5,13 @@
 //! one on, however long it took, so that interrupts cannot change a result.
 //!
 //! Both tasks run twice, on two sets of parameters and state in memory ([`duplex`]). Where the two differ, memory was
-//! changed, and the safe state follows. [`Ecu`] runs the tasks in turn on the host; firmware runs them at two priorities.
+//! changed, and the safe state follows; until it acts, the duty nearer to neutral goes out. The actuator frame is the first
+//! channel's, with the lower of both wheel speed limits. [`Ecu`] runs the tasks in turn on the host; firmware runs them at two priorities.
 //! Both give the same bits.
 
 mod control;
 mod duplex;
+mod fit;
 mod pwm;
 
 pub use control::{ControlInput, ControlOutput, ControlTask, Warning};
@@ -34,9 +36,10 @@ impl<T: Real> Ecu<T> {
     /// The program of a scenario; its independent clock counts `clock_hz` a second.
     ///
     /// # Errors
-    /// If the scenario is not valid.
+    /// If the scenario is not valid, or the gate would refuse what its controller commands.
     pub fn new(scenario: &Scenario<T>, clock_hz: u32) -> Result<Self, InvalidScenario> {
         scenario.validate()?;
+        fit::check(scenario)?;
         Ok(Self {
             pwm: PwmTask::new(scenario),
             control: ControlTask::new(scenario, clock_hz),

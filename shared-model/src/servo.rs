@@ -60,8 +60,9 @@ impl<T: Real> ParameterSet<T> for Servo<T> {
     ];
 }
 
-/// Duty cycle as the timer has it: `code` counts high out of `period`. The code is never above the period.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Duty cycle as the timer has it: `code` counts high out of `period`. The code is never above the period. Duties of one
+/// period are ordered by their code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Duty {
     code: u16,
     period: u16,

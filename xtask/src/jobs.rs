@@ -1,8 +1,10 @@
 //! The commands that do something: each a few stages, with their times.
 
+pub mod coverage;
 pub mod demo;
 pub mod firmware;
 pub mod lint;
+pub mod mutants;
 pub mod setup;
 pub mod test;
 

@@ -85,6 +85,19 @@ enum Command {
         #[arg(long, default_value = firmware::USUAL_BOARD)]
         board: String,
     },
+
+    /// Runs the model's tests with a counter in each line; fails if a line of gate or controller is run by none.
+    ///
+    /// Needs LLVM's llvm-profdata and llvm-cov; says what to install where they are missing.
+    #[command(after_help = "Example:\n  cargo xtask coverage")]
+    Coverage,
+
+    /// Changes gate, controller and ECU program in hundreds of ways, and fails if the tests do not notice one.
+    ///
+    /// Those that cannot be noticed are named, with the reason, in shared-model/mutants-survivors.txt. Takes about half an
+    /// hour on two cores, so it is no part of `test`. Installs cargo-mutants into target/tools.
+    #[command(after_help = "Example:\n  cargo xtask mutants")]
+    Mutants,
 }
 
 fn main() -> ExitCode {
@@ -95,6 +108,8 @@ fn main() -> ExitCode {
         Command::Test => jobs::test::run(),
         Command::Lint => jobs::lint::run(),
         Command::Firmware { board } => jobs::firmware::run(&board),
+        Command::Coverage => jobs::coverage::run(),
+        Command::Mutants => jobs::mutants::run(),
     };
     outcome::report(result)
 }

@@ -141,16 +141,118 @@ impl<T: Real> ControlTask<T> {
     pub fn run(&mut self, input: &ControlInput) -> ControlOutput<T> {
         let mut found_outside = input.found_by_pwm;
         found_outside.add_if(!self.channels.agrees(), Fault::ChannelsDiffer);
-        let [a, b] = self
+        let [(setpoint_a, told_a), (setpoint_b, told_b)] = self
             .channels
             .run(|channel| channel.run(input, found_outside));
-        ControlOutput {
-            setpoints: [a.0, b.0],
-            frame: encode_actuation(
-                &a.1.map(&|signal: T| signal.to_f64() as f32),
-                &mut self.sender,
+        let actuation = Actuation {
+            // The safe state judges nothing any more, so a limit that memory lost in one channel must not be told.
+            wheel_speed_limit_rpm: lower(
+                told_a.wheel_speed_limit_rpm,
+                told_b.wheel_speed_limit_rpm,
             ),
-            actuation: a.1,
+            ..told_a
+        };
+        let frame = encode_actuation(
+            &actuation.map(&|signal: T| signal.to_f64() as f32),
+            &mut self.sender,
+        );
+        ControlOutput {
+            setpoints: [setpoint_a, setpoint_b],
+            frame,
+            actuation,
+        }
+    }
+}
+
+/// The lower of two numbers, or the one that is finite.
+fn lower<T: Real>(a: T, b: T) -> T {
+    if b < a || !a.is_finite() { b } else { a }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::controller::Policy;
+    use crate::gate::Limits;
+    use crate::parameter::ParameterSet;
+    use crate::signal::Mode;
+
+    const CLOCK_HZ: u32 = 25_000_000;
+
+    /// A task with another channel in one place.
+    fn damaged(channel: usize, damage: impl Fn(&mut Channel<f32>)) -> ControlTask<f32> {
+        let mut task = ControlTask::new(&Scenario::reconstruction(), CLOCK_HZ);
+        let mut place = 0;
+        task.channels.run(|one| {
+            if place == channel {
+                damage(one);
+            }
+            place += 1;
+        });
+        task
+    }
+
+    fn flip(number: &mut f32, bit: u32) {
+        *number = f32::from_bits(number.to_bits() ^ (1 << bit));
+    }
+
+    fn assert_found(mut task: ControlTask<f32>, what: &str, bit: u32) {
+        for _ in 0..3 {
+            let output = task.run(&ControlInput::NOTHING);
+            // A limit that has become a smaller one finds faults of its own.
+            let faults = Faults::from_bits(output.actuation.faults);
+            let is_found = faults.contains(Fault::ChannelsDiffer);
+            assert!(is_found, "{what}, bit {bit}");
+            assert_eq!(output.actuation.mode, Mode::Safe);
+            // One is enough: the PWM task puts out the duty that is nearer to neutral.
+            assert!(output.setpoints.contains(&Setpoint::neutral()));
+            let limit_rpm = output.actuation.wheel_speed_limit_rpm;
+            assert!(limit_rpm <= 1100.0, "{limit_rpm} rpm: {what}, bit {bit}");
+        }
+    }
+
+    /// The safe state demands no higher speed because of it, either.
+    #[test]
+    fn every_flipped_bit_of_a_limit_is_found() {
+        for (channel, field) in [0, 1]
+            .into_iter()
+            .flat_map(|channel| Limits::<f32>::FIELDS.iter().map(move |f| (channel, f)))
+        {
+            for bit in 0..32 {
+                let mut scenario = Scenario::reconstruction();
+                flip((field.place)(&mut scenario.gate), bit);
+                let supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+                let task = damaged(channel, |one| one.supervisor = supervisor);
+                assert_found(task, field.name, bit);
+            }
+        }
+    }
+
+    #[test]
+    fn every_flipped_bit_of_the_policy_is_found() {
+        for (channel, field) in [0, 1]
+            .into_iter()
+            .flat_map(|channel| Policy::<f32>::FIELDS.iter().map(move |f| (channel, f)))
+        {
+            for bit in 0..32 {
+                let mut scenario = Scenario::reconstruction();
+                flip((field.place)(&mut scenario.policy), bit);
+                let controller = Controller::new(&scenario);
+                let task = damaged(channel, |one| one.controller = controller);
+                assert_found(task, field.name, bit);
+            }
+        }
+    }
+
+    #[test]
+    fn a_lower_speed_limit_of_one_channel_is_told() {
+        for channel in [0, 1] {
+            let mut scenario = Scenario::reconstruction();
+            scenario.gate.safe_wheel_speed_rpm = 500.0;
+            let supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+            let mut task = damaged(channel, |one| one.supervisor = supervisor);
+            let output = task.run(&ControlInput::NOTHING);
+            assert_eq!(output.actuation.wheel_speed_limit_rpm, 500.0);
         }
     }
 }

@@ -22,13 +22,21 @@ struct Channel<T> {
     limiter: Limiter<T>,
     pwm: Pwm<T>,
     setpoint: Setpoint<T>,
+    periods_a_tick: u32,
+    periods_to_tick: u32,
 }
 
 impl<T: Real> Channel<T> {
-    fn duty(&mut self) -> Duty {
+    fn begin(&mut self) -> PwmPeriod {
         let sample: T = self.oscillator.sample();
         let dither_v = self.setpoint.dither_amplitude_v * sample;
-        self.pwm.duty(self.limiter.run(&self.setpoint, dither_v))
+        let duty = self.pwm.duty(self.limiter.run(&self.setpoint, dither_v));
+        self.periods_to_tick = self.periods_to_tick.saturating_sub(1);
+        let control_due = self.periods_to_tick == 0;
+        if control_due {
+            self.periods_to_tick = self.periods_a_tick;
+        }
+        PwmPeriod { duty, control_due }
     }
 }
 
@@ -37,8 +45,6 @@ impl<T: Real> Channel<T> {
 pub struct PwmTask<T> {
     channels: Duplex<Channel<T>>,
     neutral: Duty,
-    periods_a_tick: u32,
-    periods_to_tick: u32,
     faults: Faults,
 }
 
@@ -55,28 +61,25 @@ impl<T: Real> PwmTask<T> {
                 limiter: Limiter::new(scenario, neutral.code()),
                 pwm,
                 setpoint: Setpoint::neutral(),
+                periods_a_tick,
+                periods_to_tick: periods_a_tick,
             }),
             neutral,
-            periods_a_tick,
-            periods_to_tick: periods_a_tick,
             faults: Faults::NONE,
         }
     }
 
     /// Begins a PWM period.
     pub fn begin(&mut self) -> PwmPeriod {
-        let [a, b] = self.channels.run(Channel::duty);
+        let [a, b] = self.channels.run(Channel::begin);
         self.faults.add_if(a != b, Fault::ChannelsDiffer);
-        let duty = nearer(self.neutral, a, b);
+        let duty = median(self.neutral, a.duty, b.duty);
         self.channels
             .run(|channel| channel.limiter.expect(duty.code()));
-
-        self.periods_to_tick = self.periods_to_tick.saturating_sub(1);
-        let control_due = self.periods_to_tick == 0;
-        if control_due {
-            self.periods_to_tick = self.periods_a_tick;
+        PwmPeriod {
+            duty,
+            control_due: a.control_due || b.control_due,
         }
-        PwmPeriod { duty, control_due }
     }
 
     /// Takes over what the control task computed in the last tick; for use where a control tick is due.
@@ -114,8 +117,82 @@ impl<T: Real> PwmTask<T> {
     }
 }
 
-/// Of two duties the one nearer to neutral.
-fn nearer(neutral: Duty, a: Duty, b: Duty) -> Duty {
-    let distance = |duty: Duty| duty.code().abs_diff(neutral.code());
-    if distance(b) < distance(a) { b } else { a }
+/// Where the channels differ: of the two the duty nearer to neutral, and neutral itself if they lie on both sides of it.
+fn median(neutral: Duty, a: Duty, b: Duty) -> Duty {
+    neutral.max(a.min(b)).min(a.max(b))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dither::Waveform;
+
+    const SETPOINT: Setpoint<f32> = Setpoint {
+        motor_v: 3.0,
+        dither_amplitude_v: 0.1,
+    };
+
+    fn scenario() -> Scenario<f32> {
+        let mut scenario = Scenario::reconstruction();
+        scenario.dither.waveform = Waveform::Square;
+        scenario
+    }
+
+    /// A task at work, with damage to one channel.
+    fn damaged(channel: usize, damage: impl Fn(&mut Channel<f32>)) -> PwmTask<f32> {
+        let mut task = PwmTask::new(&scenario());
+        let mut place = 0;
+        task.channels.run(|one| {
+            one.setpoint = SETPOINT;
+            if place == channel {
+                damage(one);
+            }
+            place += 1;
+        });
+        task
+    }
+
+    /// What goes out meanwhile is neutral, the right duty, or between them, and no control tick comes late.
+    fn assert_found(damage: impl Fn(&mut Channel<f32>), what: &str) {
+        for channel in [0, 1] {
+            let mut right = damaged(2, |_| {});
+            let mut wrong = damaged(channel, &damage);
+            for _ in 0..50 {
+                let (right, wrong) = (right.begin(), wrong.begin());
+                let neutral = right.duty.period() / 2;
+                assert!(
+                    (neutral..=right.duty.code()).contains(&wrong.duty.code()),
+                    "{what}"
+                );
+                assert!(wrong.control_due || !right.control_due, "{what}");
+            }
+            assert_eq!(right.faults(), Faults::NONE);
+            assert!(wrong.faults().contains(Fault::ChannelsDiffer), "{what}");
+        }
+    }
+
+    #[test]
+    fn every_flipped_bit_of_a_channel_is_found_and_harmless() {
+        for bit in 0..32 {
+            let flip = |number: f32| f32::from_bits(number.to_bits() ^ (1 << bit));
+            let mut bus = scenario();
+            bus.servo.bus_voltage_v = flip(bus.servo.bus_voltage_v);
+            let pwm = Pwm::new(&bus.servo, 10_000.0);
+            assert_found(|one| one.pwm = pwm, "bus voltage");
+
+            let mut frequency = scenario();
+            frequency.dither.square_frequency_rad_per_s = flip(2000.0);
+            let oscillator = Oscillator::new(&frequency.dither, 10_000.0);
+            if oscillator != Oscillator::new(&scenario().dither, 10_000.0) {
+                assert_found(|one| one.oscillator = oscillator, "dither frequency");
+            }
+            assert_found(|one| one.setpoint.motor_v = flip(3.0), "motor's share");
+            assert_found(
+                |one| one.setpoint.dither_amplitude_v = flip(0.1),
+                "amplitude",
+            );
+            assert_found(|one| one.periods_a_tick ^= 1 << bit, "periods in a tick");
+            assert_found(|one| one.periods_to_tick ^= 1 << bit, "periods to the tick");
+        }
+    }
 }

@@ -135,9 +135,15 @@ impl Faults {
     }
 }
 
+impl From<Fault> for Faults {
+    fn from(fault: Fault) -> Self {
+        Self(1 << fault as u32)
+    }
+}
+
 impl BitOrAssign<Fault> for Faults {
     fn bitor_assign(&mut self, fault: Fault) {
-        self.0 |= 1 << fault as u32;
+        *self |= Self::from(fault);
     }
 }
 

@@ -2,92 +2,99 @@
 
 use super::{Fault, Faults, Setpoint};
 use crate::Real;
+use crate::dither::OSCILLATOR_SINE_ERROR;
 use crate::scenario::Scenario;
 
-/// Rounding of a sample above its amplitude, as a share of it: the oscillator's error.
-const SAMPLE_ERROR: f64 = crate::dither::OSCILLATOR_SINE_ERROR;
 /// Periods in a row in which the pin may show another duty: a capture that fell onto an edge.
 const READBACK_TOLERANCE: u32 = 1;
 
+/// The half period of the dither that goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct HalfPeriod {
+    is_positive: bool,
+    samples: u32,
+    /// It began with a change of sign, not with the dither's onset.
+    is_whole: bool,
+}
+
 /// The gate at the PWM rate.
+///
+/// The frequency is judged by the whole number of samples in each half period, so it is known to one sample in that: at 10 kHz
+/// a limit of 5000 rad/s (6.28 samples) is found crossed from 5240 rad/s (6 samples) on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limiter<T> {
     /// Least and most samples in half a period of the dither.
     half_period_samples: (u32, u32),
-    /// The dither's last sample was positive; `None` while there is no dither.
-    was_positive: Option<bool>,
-    samples_since_change: u32,
-    /// The dither has changed its sign since it set in, so that the next half period is a whole one.
-    is_timed: bool,
+    /// `None` while there is no dither.
+    half_period: Option<HalfPeriod>,
     expected_code: u16,
     mismatches: u32,
     faults: Faults,
-    amplitude_v: T,
+    /// Error of a sample, as a share of the amplitude.
+    sample_error: T,
 }
 
 impl<T: Real> Limiter<T> {
     /// The gate of a scenario, the servo at `neutral_code`.
     pub fn new(scenario: &Scenario<T>, neutral_code: u16) -> Self {
         let limits = &scenario.gate;
-        let half_turn_samples = |frequency: T| {
+        let sample_error = T::from_f64(OSCILLATOR_SINE_ERROR);
+        let samples = |frequency: T| {
             T::from_f64(core::f64::consts::PI) * scenario.run.pwm_rate_hz / frequency
         };
-        let least = half_turn_samples(limits.dither_frequency_max_rad_per_s).to_u32();
-        let most = half_turn_samples(limits.dither_frequency_min_rad_per_s).to_u32();
+        // A half period falls between two whole numbers of samples, and may be off by the error of its ends.
+        let shortest = samples(limits.dither_frequency_max_rad_per_s) * (T::one() - sample_error);
+        let longest = samples(limits.dither_frequency_min_rad_per_s) * (T::one() + sample_error);
         Self {
-            // A half period falls between two whole numbers of samples.
-            half_period_samples: (least, most.saturating_add(1)),
-            was_positive: None,
-            samples_since_change: 0,
-            is_timed: false,
+            half_period_samples: (shortest.to_u32(), longest.to_u32().saturating_add(1)),
+            half_period: None,
             expected_code: neutral_code,
             mismatches: 0,
             faults: Faults::NONE,
-            amplitude_v: T::zero(),
+            sample_error,
         }
     }
 
-    /// Servo voltage of a PWM period: the motor's share and the dither's sample, the latter cut to its amplitude.
+    /// Servo voltage of a PWM period: the motor's share and the dither's sample, the latter only if it is within its amplitude.
     pub fn run(&mut self, setpoint: &Setpoint<T>, dither_v: T) -> T {
-        self.amplitude_v = setpoint.dither_amplitude_v;
-        let bound = self.amplitude_v * T::from_f64(1.0 + SAMPLE_ERROR);
-        // Written so that NaN is above the bound.
-        let is_above = !(dither_v.abs() <= bound);
-        self.faults.add_if(is_above, Fault::DitherAmplitude);
-        self.check_frequency(dither_v);
-        let limited = if dither_v > bound {
-            bound
-        } else if dither_v < -bound {
-            -bound
-        } else if is_above {
-            T::zero()
+        let amplitude_v = setpoint.dither_amplitude_v;
+        // False for NaN.
+        let is_within = dither_v.abs() <= amplitude_v * (T::one() + self.sample_error);
+        self.faults.add_if(!is_within, Fault::DitherAmplitude);
+        self.half_period = if amplitude_v == T::zero() {
+            None
         } else {
-            dither_v
+            Some(self.next_half_period(dither_v, amplitude_v))
         };
-        setpoint.motor_v + limited
+        setpoint.motor_v + if is_within { dither_v } else { T::zero() }
     }
 
-    fn check_frequency(&mut self, dither_v: T) {
-        if self.amplitude_v == T::zero() {
-            self.was_positive = None;
-            return;
-        }
-        let is_positive = dither_v > T::zero();
-        let Some(was_positive) = self.was_positive.replace(is_positive) else {
-            self.is_timed = false;
-            self.samples_since_change = 0;
-            return;
-        };
+    fn next_half_period(&mut self, dither_v: T, amplitude_v: T) -> HalfPeriod {
         let (least, most) = self.half_period_samples;
-        self.samples_since_change = self.samples_since_change.saturating_add(1);
-        let is_late = self.samples_since_change > most;
-        if is_positive != was_positive {
-            let is_early = self.is_timed && self.samples_since_change < least;
-            self.faults.add_if(is_early, Fault::DitherFrequency);
-            self.samples_since_change = 0;
-            self.is_timed = true;
+        let now = self.half_period.unwrap_or(HalfPeriod {
+            is_positive: dither_v > T::zero(),
+            samples: 0,
+            is_whole: false,
+        });
+        // Nearer to zero a sample's sign may be its error's.
+        let sure_v = amplitude_v * self.sample_error;
+        let has_changed = if now.is_positive {
+            dither_v < -sure_v
+        } else {
+            dither_v > sure_v
+        };
+        if has_changed {
+            let is_short = now.is_whole && now.samples < least;
+            self.faults.add_if(is_short, Fault::DitherFrequency);
+            return HalfPeriod {
+                is_positive: !now.is_positive,
+                samples: 1,
+                is_whole: true,
+            };
         }
-        self.faults.add_if(is_late, Fault::DitherFrequency);
+        let samples = now.samples.saturating_add(1);
+        self.faults.add_if(samples > most, Fault::DitherFrequency);
+        HalfPeriod { samples, ..now }
     }
 
     /// The duty code that is put out.

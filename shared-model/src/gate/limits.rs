@@ -4,7 +4,7 @@ use crate::Real;
 use crate::parameter::{Field, ParameterSet};
 
 /// What the gate lets through. The defaults hold every motion of the preset from 1200 to 1950 rpm, chaos included, with a
-/// margin of at least two.
+/// margin of 1.8 or more; `docs/design.md` has the measured extremes beside them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -51,6 +51,8 @@ pub struct Limits<T> {
     pub steering_memory_s: T,
     /// Greatest movement of the steering, rad, during which the yaw rate may keep its exact value.
     pub stuck_steering_rad: T,
+    /// Wheel speed up to which the steering may move without any yaw rate, rpm.
+    pub stuck_wheel_speed_rpm: T,
     /// Greatest age of the last valid sensor frame, s.
     pub frame_age_s: T,
     /// Greatest deviation of the time between two control ticks, as a share of their period.
@@ -83,6 +85,7 @@ impl<T: Real> Limits<T> {
             steering_contradiction_rad: number(0.05),
             steering_memory_s: number(0.2),
             stuck_steering_rad: number(0.2),
+            stuck_wheel_speed_rpm: number(100.0),
             frame_age_s: number(0.01),
             tick_tolerance: number(0.2),
         }
@@ -112,49 +115,90 @@ impl<T: Real> Limits<T> {
             steering_contradiction_rad: f(self.steering_contradiction_rad),
             steering_memory_s: f(self.steering_memory_s),
             stuck_steering_rad: f(self.stuck_steering_rad),
+            stuck_wheel_speed_rpm: f(self.stuck_wheel_speed_rpm),
             frame_age_s: f(self.frame_age_s),
             tick_tolerance: f(self.tick_tolerance),
         }
     }
 }
 
-/// A limit from `$min` to `$max`.
-macro_rules! limits {
-    ($($name:ident: $min:literal..$max:literal,)*) => {
-        &[$(Field {
-            name: stringify!($name),
-            min: $min,
-            max: $max,
-            place: |p| &mut p.$name,
-        }),*]
-    };
+/// A limit's name, range and place.
+const fn limit<T>(
+    name: &'static str,
+    min: f64,
+    max: f64,
+    place: fn(&mut Limits<T>) -> &mut T,
+) -> Field<Limits<T>, T> {
+    Field {
+        name,
+        min,
+        max,
+        place,
+    }
 }
 
 impl<T: Real> ParameterSet<T> for Limits<T> {
     const SECTION: &'static str = "gate";
-    const FIELDS: &'static [Field<Self, T>] = limits! {
-        motor_voltage_v: 0.0..1000.0,
-        motor_slew_v_per_s: 1e-3..1e6,
-        square_amplitude_v: 0.0..1000.0,
-        sine_amplitude_v: 0.0..1000.0,
-        dither_frequency_min_rad_per_s: 1.0..1e6,
-        dither_frequency_max_rad_per_s: 1.0..1e6,
-        ramp_out_s: 1e-3..10.0,
-        safe_wheel_speed_rpm: 0.0..1e5,
-        wheel_speed_rpm: 1.0..1e5,
-        wheel_acceleration_rpm_per_s: 1.0..1e6,
-        yaw_rate_rad_per_s: 1e-3..100.0,
-        yaw_acceleration_rad_per_s2: 1e-3..1e5,
-        steering_angle_rad: 1e-3..10.0,
-        steering_angle_change_rad_per_s: 1e-3..1e5,
-        steering_rate_rad_per_s: 1e-3..1000.0,
-        steering_acceleration_rad_per_s2: 1e-3..1e6,
-        current_request_a: 0.0..1000.0,
-        lateral_acceleration_m_per_s2: 0.1..1000.0,
-        steering_contradiction_rad: 1e-4..10.0,
-        steering_memory_s: 1e-2..10.0,
-        stuck_steering_rad: 1e-3..10.0,
-        frame_age_s: 1e-3..1.0,
-        tick_tolerance: 0.01..1.0,
-    };
+    const FIELDS: &'static [Field<Self, T>] = &[
+        limit("motor_voltage_v", 0.0, 1000.0, |p| &mut p.motor_voltage_v),
+        limit("motor_slew_v_per_s", 1e-3, 1e6, |p| {
+            &mut p.motor_slew_v_per_s
+        }),
+        limit("square_amplitude_v", 0.0, 1000.0, |p| {
+            &mut p.square_amplitude_v
+        }),
+        limit("sine_amplitude_v", 0.0, 1000.0, |p| &mut p.sine_amplitude_v),
+        limit("dither_frequency_min_rad_per_s", 1.0, 1e6, |p| {
+            &mut p.dither_frequency_min_rad_per_s
+        }),
+        limit("dither_frequency_max_rad_per_s", 1.0, 1e6, |p| {
+            &mut p.dither_frequency_max_rad_per_s
+        }),
+        limit("ramp_out_s", 1e-3, 10.0, |p| &mut p.ramp_out_s),
+        limit("safe_wheel_speed_rpm", 0.0, 1e5, |p| {
+            &mut p.safe_wheel_speed_rpm
+        }),
+        limit("wheel_speed_rpm", 1.0, 1e5, |p| &mut p.wheel_speed_rpm),
+        limit("wheel_acceleration_rpm_per_s", 1.0, 1e6, |p| {
+            &mut p.wheel_acceleration_rpm_per_s
+        }),
+        limit("yaw_rate_rad_per_s", 1e-3, 100.0, |p| {
+            &mut p.yaw_rate_rad_per_s
+        }),
+        limit("yaw_acceleration_rad_per_s2", 1e-3, 1e5, |p| {
+            &mut p.yaw_acceleration_rad_per_s2
+        }),
+        limit("steering_angle_rad", 1e-3, 10.0, |p| {
+            &mut p.steering_angle_rad
+        }),
+        limit("steering_angle_change_rad_per_s", 1e-3, 1e5, |p| {
+            &mut p.steering_angle_change_rad_per_s
+        }),
+        limit("steering_rate_rad_per_s", 1e-3, 1000.0, |p| {
+            &mut p.steering_rate_rad_per_s
+        }),
+        limit("steering_acceleration_rad_per_s2", 1e-3, 1e6, |p| {
+            &mut p.steering_acceleration_rad_per_s2
+        }),
+        limit("current_request_a", 0.0, 1000.0, |p| {
+            &mut p.current_request_a
+        }),
+        limit("lateral_acceleration_m_per_s2", 0.1, 1000.0, |p| {
+            &mut p.lateral_acceleration_m_per_s2
+        }),
+        limit("steering_contradiction_rad", 1e-4, 10.0, |p| {
+            &mut p.steering_contradiction_rad
+        }),
+        limit("steering_memory_s", 1e-2, 10.0, |p| {
+            &mut p.steering_memory_s
+        }),
+        limit("stuck_steering_rad", 1e-3, 10.0, |p| {
+            &mut p.stuck_steering_rad
+        }),
+        limit("stuck_wheel_speed_rpm", 0.0, 1e5, |p| {
+            &mut p.stuck_wheel_speed_rpm
+        }),
+        limit("frame_age_s", 1e-3, 1.0, |p| &mut p.frame_age_s),
+        limit("tick_tolerance", 0.01, 1.0, |p| &mut p.tick_tolerance),
+    ];
 }

@@ -16,7 +16,7 @@ pub struct Plausibility<T> {
     ticks: T,
     /// Steering angle's change less the integral of the steering rate, forgotten exponentially, rad.
     contradiction_rad: T,
-    /// Movement of the steering since the yaw rate changed, rad.
+    /// How far the steering is from where it was when the yaw rate last changed, rad.
     unanswered_steering_rad: T,
 }
 
@@ -37,14 +37,14 @@ impl<T: Real> Plausibility<T> {
     /// A control tick; `measurement` is new, or `None` if there was none. Returns what is wrong with it.
     pub fn check(&mut self, measurement: Option<&Measurement<T>>) -> Faults {
         self.ticks += T::one();
-        let mut faults = Faults::NONE;
         let Some(now) = measurement else {
-            return faults;
+            return Faults::NONE;
         };
-        faults.add_if(
-            !signals(now).into_iter().all(is_a_number),
-            Fault::SensorNotANumber,
-        );
+        // Of what is not a number nothing else can be said.
+        if !signals(now).into_iter().all(is_a_number) {
+            return Fault::SensorNotANumber.into();
+        }
+        let mut faults = Faults::NONE;
         faults.add_if(!self.is_in_range(now), Fault::SensorRange);
         let acceleration = now.wheel_speed_rpm * self.speed_per_rpm * now.yaw_rate_rad_per_s;
         let bound = self.limits.lateral_acceleration_m_per_s2;
@@ -91,13 +91,15 @@ impl<T: Real> Plausibility<T> {
         let moved_rad = now.steering_angle_rad - last.steering_angle_rad;
         let mean_rate =
             T::from_f64(0.5) * (now.steering_rate_rad_per_s + last.steering_rate_rad_per_s);
-        let kept = T::one() - time_s / limits.steering_memory_s;
+        let memory_s = limits.steering_memory_s;
+        let kept = memory_s / (memory_s + time_s);
         self.contradiction_rad = self.contradiction_rad * kept + moved_rad - mean_rate * time_s;
-        let answered = now.yaw_rate_rad_per_s != last.yaw_rate_rad_per_s;
-        self.unanswered_steering_rad = if answered {
+        let is_answered = now.yaw_rate_rad_per_s != last.yaw_rate_rad_per_s;
+        let can_answer = now.wheel_speed_rpm > limits.stuck_wheel_speed_rpm;
+        self.unanswered_steering_rad = if is_answered || !can_answer {
             T::zero()
         } else {
-            self.unanswered_steering_rad + moved_rad.abs()
+            self.unanswered_steering_rad + moved_rad
         };
 
         let mut faults = Faults::NONE;
@@ -107,7 +109,7 @@ impl<T: Real> Plausibility<T> {
             Fault::SteeringInconsistent,
         );
         faults.add_if(
-            self.unanswered_steering_rad > limits.stuck_steering_rad,
+            !is_within(self.unanswered_steering_rad, limits.stuck_steering_rad),
             Fault::SensorStuck,
         );
         faults

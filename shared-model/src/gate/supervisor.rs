@@ -7,8 +7,8 @@ use crate::dither::Waveform;
 use crate::scenario::Scenario;
 use crate::signal::{Measurement, Mode};
 
-/// Rounding that a command may have above its limit, as a share of it.
-const ROUNDING: f64 = 1e-5;
+/// Rounding that a command may have beyond a limit, as a share of the greatest command.
+const ROUNDING: f64 = 1e-6;
 
 /// What the gate sees at a control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,13 +25,23 @@ pub struct Observation<T> {
     pub found_outside: Faults,
 }
 
+/// Greatest magnitudes of a command.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Most<T> {
+    motor_v: T,
+    /// Change of the motor's share in a control tick.
+    motor_change_v: T,
+    dither_amplitude_v: T,
+}
+
 /// The gate at the control rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervisor<T> {
     limits: Limits<T>,
     plausibility: Plausibility<T>,
-    amplitude_limit_v: T,
-    /// Greatest change of the motor's share in a control tick, V.
+    /// What a command may be at most, rounding included.
+    most: Most<T>,
+    /// Change of the motor's share in a control tick of the safe state, V.
     slew_v: T,
     /// What the safe state takes from the amplitude in a control tick, V.
     ramp_v: T,
@@ -55,16 +65,23 @@ impl<T: Real> Supervisor<T> {
             Waveform::Square => limits.square_amplitude_v,
             Waveform::Sine => limits.sine_amplitude_v,
         };
+        let slew_v = limits.motor_slew_v_per_s * period_s;
+        let rounding = T::from_f64(ROUNDING);
         let counts = T::from_u32(clock_hz) * period_s;
         let tolerance = limits.tick_tolerance * counts;
         Self {
             limits,
             plausibility: Plausibility::new(&limits, period_s, speed_per_rpm),
-            amplitude_limit_v,
-            slew_v: limits.motor_slew_v_per_s * period_s,
+            most: Most {
+                motor_v: limits.motor_voltage_v * (T::one() + rounding),
+                motor_change_v: slew_v + rounding * limits.motor_voltage_v,
+                dither_amplitude_v: amplitude_limit_v * (T::one() + rounding),
+            },
+            slew_v,
             ramp_v: amplitude_limit_v * period_s / limits.ramp_out_s,
             window_counts: ((counts - tolerance).to_u32(), (counts + tolerance).to_u32()),
-            frame_age_ticks: (limits.frame_age_s * scenario.run.control_rate_hz).to_u32(),
+            frame_age_ticks: (limits.frame_age_s * scenario.run.control_rate_hz + T::from_f64(0.5))
+                .to_u32(),
             ticks_since_frame: 0,
             mode: Mode::Starting,
             faults: Faults::NONE,
@@ -74,16 +91,11 @@ impl<T: Real> Supervisor<T> {
 
     /// A control tick: judges what was observed, and lets through what is within the limits.
     pub fn run(&mut self, seen: &Observation<T>) -> Setpoint<T> {
-        let is_first = self.mode == Mode::Starting;
         // What follows a fault is its consequence, and says nothing new.
         if self.mode != Mode::Safe {
             let found = self.judge(seen);
             self.faults |= found;
-        }
-        if !self.faults.is_empty() {
-            self.mode = Mode::Safe;
-        } else if is_first && seen.measurement.is_some() {
-            self.mode = Mode::Active;
+            self.mode = self.next_mode(seen.measurement.is_some());
         }
         self.setpoint = match self.mode {
             Mode::Starting => Setpoint::neutral(),
@@ -96,10 +108,21 @@ impl<T: Real> Supervisor<T> {
         self.setpoint
     }
 
+    fn next_mode(&self, has_measurement: bool) -> Mode {
+        if !self.faults.is_empty() {
+            Mode::Safe
+        } else if has_measurement {
+            Mode::Active
+        } else {
+            self.mode
+        }
+    }
+
     fn judge(&mut self, seen: &Observation<T>) -> Faults {
         let mut faults = seen.found_outside;
         faults |= self.plausibility.check(seen.measurement.as_ref());
         faults |= self.command_faults(seen);
+        // Nobody knows how long ago the last tick or frame was before the first, and until then the servo is neutral.
         if self.mode == Mode::Starting {
             return faults;
         }
@@ -116,28 +139,17 @@ impl<T: Real> Supervisor<T> {
     }
 
     fn command_faults(&self, seen: &Observation<T>) -> Faults {
-        let above = |value: T, limit: T| {
-            // Written so that NaN is above every limit.
-            !(value.abs() <= limit * T::from_f64(1.0 + ROUNDING))
-        };
         let (motor_v, amplitude_v) = (seen.motor_v, seen.dither_amplitude_v);
+        if !(motor_v.is_finite() && amplitude_v.is_finite()) {
+            return Fault::CommandNotANumber.into();
+        }
+        let most = &self.most;
+        let change_v = motor_v - self.setpoint.motor_v;
+        let is_amplitude = amplitude_v >= T::zero() && amplitude_v <= most.dither_amplitude_v;
         let mut faults = Faults::NONE;
-        faults.add_if(
-            !motor_v.is_finite() || !amplitude_v.is_finite(),
-            Fault::CommandNotANumber,
-        );
-        faults.add_if(
-            above(motor_v, self.limits.motor_voltage_v),
-            Fault::MotorVoltage,
-        );
-        faults.add_if(
-            above(motor_v - self.setpoint.motor_v, self.slew_v),
-            Fault::MotorSlew,
-        );
-        faults.add_if(
-            amplitude_v < T::zero() || above(amplitude_v, self.amplitude_limit_v),
-            Fault::DitherAmplitude,
-        );
+        faults.add_if(motor_v.abs() > most.motor_v, Fault::MotorVoltage);
+        faults.add_if(change_v.abs() > most.motor_change_v, Fault::MotorSlew);
+        faults.add_if(!is_amplitude, Fault::DitherAmplitude);
         faults
     }
 

@@ -1,0 +1,520 @@
+//! The gate at the control rate: commands, time, modes and the safe state. Sensors and samples have tests of their own.
+
+use proptest::prelude::*;
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use shared_model::gate::{Fault, Faults, Observation, Setpoint, Supervisor};
+use shared_model::signal::{Measurement, Mode};
+
+const CLOCK_HZ: u32 = 25_000_000;
+const TICK_COUNTS: u32 = 25_000;
+/// Change of the motor's share in a tick, V: 4 V/s at 1 kHz.
+const SLEW_V: f32 = 4e-3;
+const MOTOR_LIMIT_V: f32 = 4.5;
+const SQUARE_LIMIT_V: f32 = 0.2;
+/// Just beyond a limit: more than rounding, less than a PWM count.
+const ABOVE: f32 = 1.000_01;
+
+fn scenario(waveform: Waveform) -> Scenario<f32> {
+    let mut scenario = Scenario::reconstruction();
+    scenario.dither.waveform = waveform;
+    scenario
+}
+
+fn supervisor(waveform: Waveform) -> Supervisor<f32> {
+    Supervisor::new(&scenario(waveform), CLOCK_HZ)
+}
+
+fn calm() -> Measurement<f32> {
+    Measurement {
+        wheel_speed_rpm: 1750.0,
+        yaw_rate_rad_per_s: 0.5,
+        steering_angle_rad: 0.1,
+        steering_rate_rad_per_s: 0.0,
+        current_request_a: 10.0,
+    }
+}
+
+fn command(motor_v: f32, dither_amplitude_v: f32) -> Observation<f32> {
+    Observation {
+        elapsed_counts: TICK_COUNTS,
+        measurement: Some(calm()),
+        motor_v,
+        dither_amplitude_v,
+        found_outside: Faults::NONE,
+    }
+}
+
+/// A gate that has let the motor's share come to `motor_v`.
+fn active_at(waveform: Waveform, motor_v: f32) -> Supervisor<f32> {
+    let mut supervisor = supervisor(waveform);
+    let ticks = (motor_v.abs() / SLEW_V).ceil();
+    for tick in 0..=ticks as u32 {
+        let share = (tick as f32 / ticks.max(1.0)).min(1.0);
+        supervisor.run(&command(share * motor_v, 0.0));
+    }
+    assert_eq!(supervisor.faults(), Faults::NONE);
+    assert_eq!(supervisor.mode(), Mode::Active);
+    supervisor
+}
+
+fn assert_only(supervisor: &Supervisor<f32>, fault: Fault) {
+    assert_eq!(
+        supervisor.faults().iter().collect::<Vec<_>>(),
+        [fault],
+        "{}",
+        fault.name()
+    );
+    assert_eq!(supervisor.mode(), Mode::Safe);
+}
+
+fn assert_clean(supervisor: &Supervisor<f32>) {
+    assert_eq!(
+        supervisor.faults().iter().collect::<Vec<_>>(),
+        [],
+        "no fault"
+    );
+    assert_eq!(supervisor.mode(), Mode::Active);
+}
+
+#[test]
+fn faults_are_bits_with_names() {
+    let mut all = Faults::NONE;
+    assert!(all.is_empty());
+    for (bit, fault) in Fault::ALL.into_iter().enumerate() {
+        assert_eq!(fault as usize, bit);
+        assert_eq!(Faults::from(fault).bits(), 1 << bit);
+        assert!(!all.contains(fault));
+        all.add_if(false, fault);
+        assert!(!all.contains(fault));
+        all.add_if(true, fault);
+        all |= fault;
+        assert!(all.contains(fault) && !all.is_empty());
+    }
+    assert_eq!(all.bits(), 0xFFFF);
+    assert_eq!(all.iter().collect::<Vec<_>>(), Fault::ALL);
+    let mut one = Faults::from(Fault::Readback);
+    one |= Faults::from(Fault::FrameAge);
+    one |= Faults::from(Fault::FrameAge);
+    assert_eq!(one, Faults::from_bits(1 << 14 | 1 << 6));
+    assert_eq!(Faults::from_bits(0), Faults::default());
+    let mut names = Fault::ALL.map(Fault::name).to_vec();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!(names.len(), Fault::ALL.len());
+    assert!(names.iter().all(|name| name.len() > 5));
+}
+
+#[test]
+fn neutral_until_the_first_measurement() {
+    let mut supervisor = supervisor(Waveform::Square);
+    let limits = scenario(Waveform::Square).gate;
+    // Neither time nor the age of a frame has a beginning yet.
+    for elapsed_counts in (0..1000).chain([u32::MAX]) {
+        let nothing = Observation {
+            elapsed_counts,
+            measurement: None,
+            ..command(0.0, 0.0)
+        };
+        assert_eq!(supervisor.run(&nothing), Setpoint::neutral());
+        assert_eq!(supervisor.mode(), Mode::Starting);
+        assert_eq!(supervisor.faults(), Faults::NONE);
+        let limit_rpm = supervisor.wheel_speed_limit_rpm();
+        assert_eq!(limit_rpm, limits.safe_wheel_speed_rpm);
+    }
+    let first = Observation {
+        elapsed_counts: 0,
+        ..command(SLEW_V, 0.1)
+    };
+    let setpoint = supervisor.run(&first);
+    assert_clean(&supervisor);
+    assert_eq!(
+        (setpoint.motor_v, setpoint.dither_amplitude_v),
+        (SLEW_V, 0.1)
+    );
+    assert_eq!(supervisor.wheel_speed_limit_rpm(), limits.wheel_speed_rpm);
+}
+
+#[test]
+fn no_command_before_the_first_measurement_is_followed() {
+    let early = Observation {
+        measurement: None,
+        ..command(SLEW_V, 0.1)
+    };
+    let mut supervisor = supervisor(Waveform::Square);
+    assert_eq!(supervisor.run(&early), Setpoint::neutral());
+    assert_eq!(supervisor.mode(), Mode::Starting);
+}
+
+#[test]
+fn motor_voltage_has_a_limit_on_both_sides() {
+    for sign in [1.0, -1.0] {
+        let mut at = active_at(Waveform::Square, sign * MOTOR_LIMIT_V);
+        for _ in 0..100 {
+            let setpoint = at.run(&command(sign * MOTOR_LIMIT_V, 0.0));
+            assert_eq!(setpoint.motor_v, sign * MOTOR_LIMIT_V);
+        }
+        assert_clean(&at);
+        at.run(&command(sign * MOTOR_LIMIT_V * ABOVE, 0.0));
+        assert_only(&at, Fault::MotorVoltage);
+    }
+}
+
+#[test]
+fn motor_slew_has_a_limit_both_ways_from_anywhere() {
+    for start_v in [0.0, 2.0, -2.0, 4.4, -4.4] {
+        for sign in [1.0, -1.0] {
+            let step_v = sign * SLEW_V;
+            let mut at = active_at(Waveform::Square, start_v);
+            at.run(&command(start_v + step_v, 0.0));
+            at.run(&command(start_v + 2.0 * step_v, 0.0));
+            assert_clean(&at);
+            at.run(&command(start_v + 3.01 * step_v, 0.0));
+            assert_only(&at, Fault::MotorSlew);
+        }
+    }
+}
+
+#[test]
+fn motor_slew_holds_in_the_first_tick_and_across_lost_frames() {
+    let mut first = supervisor(Waveform::Square);
+    first.run(&command(1.01 * SLEW_V, 0.0));
+    assert_only(&first, Fault::MotorSlew);
+
+    let mut later = active_at(Waveform::Square, 1.0);
+    for _ in 0..5 {
+        later.run(&Observation {
+            measurement: None,
+            ..command(1.0, 0.0)
+        });
+    }
+    assert_clean(&later);
+    later.run(&command(1.0 + 1.01 * SLEW_V, 0.0));
+    assert_only(&later, Fault::MotorSlew);
+}
+
+/// What the limit lets through exactly, a controller at that limit must be able to command for ever.
+#[test]
+fn a_controller_at_the_limits_raises_no_alarm() {
+    let mut supervisor = supervisor(Waveform::Square);
+    let mut motor_v = 0.0_f32;
+    let mut step_v = SLEW_V;
+    for _ in 0..100_000 {
+        if (motor_v + step_v).abs() > MOTOR_LIMIT_V {
+            step_v = -step_v;
+        }
+        motor_v += step_v;
+        supervisor.run(&command(motor_v, SQUARE_LIMIT_V));
+    }
+    assert_clean(&supervisor);
+}
+
+#[test]
+fn dither_amplitude_has_a_limit_for_each_waveform() {
+    for (waveform, limit_v) in [
+        (Waveform::None, 0.0),
+        (Waveform::Square, SQUARE_LIMIT_V),
+        (Waveform::Sine, 1.3),
+    ] {
+        for good in [0.0, -0.0, 0.5 * limit_v, limit_v] {
+            let mut supervisor = supervisor(waveform);
+            let setpoint = supervisor.run(&command(0.0, good));
+            assert_clean(&supervisor);
+            assert_eq!(setpoint.dither_amplitude_v, good);
+        }
+        for bad in [limit_v * ABOVE + 1e-30, -1e-30, -limit_v, 1e30] {
+            let mut supervisor = supervisor(waveform);
+            supervisor.run(&command(0.0, if bad == 0.0 { -1.0 } else { bad }));
+            assert_only(&supervisor, Fault::DitherAmplitude);
+        }
+    }
+}
+
+#[test]
+fn a_command_that_is_no_number_is_named_as_that() {
+    for bad in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for observation in [command(bad, 0.0), command(0.0, bad), command(bad, bad)] {
+            let mut supervisor = supervisor(Waveform::Sine);
+            assert_eq!(supervisor.run(&observation), Setpoint::neutral());
+            assert_only(&supervisor, Fault::CommandNotANumber);
+        }
+    }
+}
+
+#[test]
+fn ticks_have_a_window() {
+    let elapsed = |elapsed_counts| Observation {
+        elapsed_counts,
+        ..command(0.0, 0.0)
+    };
+    for good in [20_000, 20_001, 25_000, 29_999, 30_000] {
+        let mut supervisor = active_at(Waveform::Square, 0.0);
+        supervisor.run(&elapsed(good));
+        assert_clean(&supervisor);
+    }
+    for bad in [0, 12_500, 19_999, 30_001, 50_000, u32::MAX] {
+        let mut supervisor = active_at(Waveform::Square, 0.0);
+        supervisor.run(&elapsed(bad));
+        assert_only(&supervisor, Fault::TickWindow);
+    }
+}
+
+#[test]
+fn frames_grow_too_old() {
+    let none = Observation {
+        measurement: None,
+        ..command(0.0, 0.0)
+    };
+    let mut supervisor = active_at(Waveform::Square, 0.0);
+    for _ in 0..3 {
+        for _ in 0..10 {
+            supervisor.run(&none);
+        }
+        assert_clean(&supervisor);
+        supervisor.run(&command(0.0, 0.0));
+    }
+    for _ in 0..10 {
+        supervisor.run(&none);
+    }
+    assert_clean(&supervisor);
+    supervisor.run(&none);
+    assert_only(&supervisor, Fault::FrameAge);
+}
+
+/// The age in ticks is the nearest to the limit in seconds, not one less by f32's rounding.
+#[test]
+fn frame_age_is_rounded_to_ticks() {
+    for (age_s, rate_hz, ticks) in [(0.003, 1000.0, 3), (0.009, 1000.0, 9), (0.0126, 500.0, 6)] {
+        let mut scenario = scenario(Waveform::Square);
+        scenario.gate.frame_age_s = age_s;
+        scenario.run.control_rate_hz = rate_hz;
+        let mut supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+        let elapsed_counts = CLOCK_HZ / rate_hz as u32;
+        let tick = |measurement| Observation {
+            elapsed_counts,
+            measurement,
+            ..command(0.0, 0.0)
+        };
+        supervisor.run(&tick(Some(calm())));
+        for _ in 0..ticks {
+            supervisor.run(&tick(None));
+        }
+        assert_clean(&supervisor);
+        supervisor.run(&tick(None));
+        assert_only(&supervisor, Fault::FrameAge);
+    }
+}
+
+#[test]
+fn what_is_found_outside_is_a_fault_in_every_mode() {
+    for fault in Fault::ALL {
+        let found = Observation {
+            found_outside: fault.into(),
+            ..command(0.0, 0.0)
+        };
+        let mut active = active_at(Waveform::Square, 0.0);
+        active.run(&found);
+        assert_only(&active, fault);
+        let mut starting = supervisor(Waveform::Square);
+        starting.run(&Observation {
+            measurement: None,
+            ..found
+        });
+        assert_only(&starting, fault);
+    }
+    // A bit without a name is a fault all the same.
+    let mut nameless = active_at(Waveform::Square, 0.0);
+    nameless.run(&Observation {
+        found_outside: Faults::from_bits(1 << 31),
+        ..command(0.0, 0.0)
+    });
+    assert_eq!(nameless.mode(), Mode::Safe);
+}
+
+#[test]
+fn an_impossible_measurement_is_a_fault_even_if_it_is_the_first() {
+    for mut supervisor in [
+        supervisor(Waveform::Square),
+        active_at(Waveform::Square, 0.0),
+    ] {
+        let mut measurement = calm();
+        measurement.current_request_a = 21.0;
+        supervisor.run(&Observation {
+            measurement: Some(measurement),
+            ..command(0.0, 0.0)
+        });
+        assert_only(&supervisor, Fault::SensorRange);
+    }
+}
+
+#[test]
+fn the_gate_knows_the_vehicles_wheels() {
+    let mut scenario = scenario(Waveform::Square);
+    // 1750 rpm at 4 rad/s is 220 m/s^2 with this wheel, and more than the limit with a larger one.
+    let mut measurement = calm();
+    measurement.yaw_rate_rad_per_s = 4.0;
+    let observation = Observation {
+        measurement: Some(measurement),
+        ..command(0.0, 0.0)
+    };
+    let mut supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+    supervisor.run(&observation);
+    assert_clean(&supervisor);
+    scenario.vehicle.wheel_radius_m *= 1.2;
+    let mut supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+    supervisor.run(&observation);
+    assert_only(&supervisor, Fault::LateralAcceleration);
+}
+
+/// Dither out in 0.1 s, motor at 4 V/s, then neutral whatever comes.
+#[test]
+fn safe_state_ramps_out_and_is_latched() {
+    for (motor_v, amplitude_v) in [
+        (3.0, 0.2),
+        (-3.0, 0.1),
+        (4.5, 0.2),
+        (0.0, 0.15),
+        (1e-3, 0.0),
+    ] {
+        let mut supervisor = active_at(Waveform::Square, motor_v);
+        supervisor.run(&command(motor_v, amplitude_v));
+        let mut last = supervisor.run(&Observation {
+            found_outside: Fault::Readback.into(),
+            ..command(motor_v, amplitude_v)
+        });
+        // The tick that finds the fault takes the first step.
+        assert!((last.motor_v.abs() - (motor_v.abs() - SLEW_V).max(0.0)).abs() < 1e-6);
+        assert!((last.dither_amplitude_v - (amplitude_v - 2e-3).max(0.0)).abs() < 1e-6);
+        let (mut motor_ticks, mut dither_ticks) = (1, 1);
+        for tick in 0..5000 {
+            // Nothing that is commanded or measured from now on has a say.
+            let any = match tick % 4 {
+                0 => command(f32::NAN, f32::INFINITY),
+                1 => command(-4.5, 0.2),
+                2 => Observation {
+                    elapsed_counts: 0,
+                    measurement: None,
+                    ..command(4.5, 0.0)
+                },
+                _ => Observation {
+                    found_outside: Fault::ChannelsDiffer.into(),
+                    ..command(0.0, 0.0)
+                },
+            };
+            let now = supervisor.run(&any);
+            let step_v = last.motor_v - now.motor_v;
+            assert!(now.motor_v.abs() <= last.motor_v.abs());
+            assert!(now.motor_v * last.motor_v >= 0.0, "no overshoot");
+            assert!(step_v.abs() <= SLEW_V * 1.001);
+            let drop_v = last.dither_amplitude_v - now.dither_amplitude_v;
+            assert!((0.0..=2e-3 * 1.001).contains(&drop_v));
+            motor_ticks += u32::from(last.motor_v != 0.0);
+            dither_ticks += u32::from(last.dither_amplitude_v != 0.0);
+            assert_only(&supervisor, Fault::Readback);
+            assert_eq!(supervisor.wheel_speed_limit_rpm(), 1100.0);
+            last = now;
+        }
+        assert_eq!(last, Setpoint::neutral());
+        let motor_least = (motor_v.abs() / SLEW_V) as u32;
+        assert!(
+            (motor_least..=motor_least + 2).contains(&motor_ticks),
+            "{motor_ticks}"
+        );
+        let dither_least = (amplitude_v / 2e-3) as u32;
+        assert!(
+            (dither_least..=dither_least + 2).contains(&dither_ticks),
+            "{dither_ticks}"
+        );
+    }
+}
+
+#[test]
+fn a_restart_forgets_the_fault() {
+    let mut stopped = active_at(Waveform::Square, 0.0);
+    stopped.run(&command(f32::NAN, 0.0));
+    assert_eq!(stopped.mode(), Mode::Safe);
+    assert_clean(&active_at(Waveform::Square, 0.0));
+}
+
+/// Rates other than the preset's scale what happens in a tick.
+#[test]
+fn limits_are_by_time_not_by_tick() {
+    let mut scenario = scenario(Waveform::Sine);
+    scenario.run.control_rate_hz = 100.0;
+    let ten_times = Observation {
+        elapsed_counts: 10 * TICK_COUNTS,
+        ..command(10.0 * SLEW_V, 1.3)
+    };
+    let mut supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+    supervisor.run(&ten_times);
+    supervisor.run(&ten_times);
+    assert_clean(&supervisor);
+    let fault = Observation {
+        found_outside: Fault::Readback.into(),
+        ..ten_times
+    };
+    let setpoint = supervisor.run(&fault);
+    assert!(setpoint.motor_v.abs() < 1e-6);
+    assert!((setpoint.dither_amplitude_v - 1.3 * 0.9).abs() < 1e-6);
+}
+
+fn any_f32() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        any::<u32>().prop_map(f32::from_bits),
+        -5.0_f32..5.0,
+        -0.005_f32..0.005,
+        Just(0.0)
+    ]
+}
+
+prop_compose! {
+    fn any_observation()(
+        elapsed_counts in prop_oneof![9 => Just(TICK_COUNTS), 1 => any::<u32>()],
+        measurement in prop_oneof![
+            8 => Just(Some(calm())),
+            1 => Just(None),
+            1 => any_f32().prop_map(|yaw_rate_rad_per_s| Some(Measurement { yaw_rate_rad_per_s, ..calm() })),
+        ],
+        motor_v in any_f32(),
+        dither_amplitude_v in any_f32(),
+        is_change in any::<bool>(),
+        bits in prop_oneof![20 => Just(0), 1 => any::<u32>()],
+    ) -> (Observation<f32>, bool) {
+        let found_outside = Faults::from_bits(bits);
+        (Observation { elapsed_counts, measurement, motor_v, dither_amplitude_v, found_outside }, is_change)
+    }
+}
+
+proptest! {
+    /// Whatever is commanded: limits hold in every tick, and a fault ends in neutral for good.
+    #[test]
+    fn nothing_gets_past(observations in prop::collection::vec(any_observation(), 1..60)) {
+        let mut supervisor = supervisor(Waveform::Square);
+        let mut last = Setpoint::<f32>::neutral();
+        for (observation, is_change) in &observations {
+            let mut observation = *observation;
+            // Half of the commands are changes, so that some sequences stay within the slew limit.
+            if *is_change {
+                observation.motor_v = last.motor_v + observation.motor_v.clamp(-SLEW_V, SLEW_V);
+                observation.dither_amplitude_v = observation.dither_amplitude_v.clamp(0.0, SQUARE_LIMIT_V);
+            }
+            let was_safe = supervisor.mode() == Mode::Safe;
+            let now: Setpoint<f32> = supervisor.run(&observation);
+            prop_assert!(now.motor_v.abs() <= MOTOR_LIMIT_V * ABOVE);
+            prop_assert!((now.motor_v - last.motor_v).abs() <= SLEW_V * 1.01);
+            prop_assert!((0.0..=SQUARE_LIMIT_V * ABOVE).contains(&now.dither_amplitude_v));
+            prop_assert_eq!(supervisor.mode() == Mode::Safe, !supervisor.faults().is_empty());
+            if was_safe {
+                prop_assert_eq!(supervisor.mode(), Mode::Safe);
+                prop_assert!(now.motor_v.abs() <= last.motor_v.abs());
+                prop_assert!(now.dither_amplitude_v <= last.dither_amplitude_v);
+            }
+            last = now;
+        }
+        supervisor.run(&command(f32::NAN, f32::NAN));
+        for _ in 0..1126 {
+            last = supervisor.run(&command(f32::NAN, f32::NAN));
+        }
+        prop_assert_eq!(last, Setpoint::neutral());
+    }
+}
