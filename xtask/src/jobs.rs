@@ -3,6 +3,7 @@
 pub mod demo;
 pub mod firmware;
 pub mod lint;
+pub mod proofs;
 pub mod setup;
 pub mod test;
 

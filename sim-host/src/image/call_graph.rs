@@ -185,7 +185,7 @@ impl CallGraph {
 }
 
 /// The functions by address, with their names only.
-fn named(file: &object::File<'_>) -> BTreeMap<u32, Function> {
+pub(super) fn named(file: &object::File<'_>) -> BTreeMap<u32, Function> {
     let mut functions = BTreeMap::new();
     for symbol in file.symbols().filter(|s| s.kind() == SymbolKind::Text) {
         let Ok(name) = symbol.name() else { continue };

@@ -33,3 +33,13 @@ pub enum AnalysisError {
     #[error("the section .stack_sizes is damaged")]
     StackSizes,
 }
+
+/// Names of all functions in an image, without the compiler's hashes.
+///
+/// # Errors
+/// If it is no ELF, or damaged.
+pub fn function_names(bytes: &[u8]) -> Result<Vec<String>, AnalysisError> {
+    let file = object::File::parse(bytes)?;
+    let functions = call_graph::named(&file).into_values();
+    Ok(functions.flat_map(|function| function.names).collect())
+}

@@ -12,6 +12,7 @@ mod text;
 
 pub use figure::schedule_map::draw as schedule_map;
 
+use crate::instructions::Instructions;
 use crate::trace::Trace;
 use crate::verdict::Verdict;
 use anyhow::{Context, ensure};
@@ -39,10 +40,8 @@ pub struct RunReport {
     pub horizon_s: Option<[f64; 3]>,
     /// Distance at which they count as parted, or which they must never reach.
     pub divergence_limit: f64,
-    /// Instructions of each control task, and how often: ascending.
-    pub control_instructions: Vec<(u32, u64)>,
-    /// Instructions of the slowest PWM task in each step, and how often: ascending.
-    pub pwm_instructions: Vec<(u32, u64)>,
+    /// What its tasks took.
+    pub instructions: Instructions,
 }
 
 /// Two runs that differ in nothing but the dither.
@@ -67,6 +66,10 @@ pub struct ReportInput<'a> {
     pub runs: &'a [RunReport],
     /// The runs to be shown before and after.
     pub pairs: &'a [Pair],
+    /// Name and text of recorded proofs about the firmware.
+    pub proofs: &'a [(String, String)],
+    /// Title and instructions of runs that have nothing else to show.
+    pub further_instructions: &'a [(String, Instructions)],
     /// Name and value of further facts: memory use, toolchain, revision.
     pub notes: &'a [(String, String)],
 }

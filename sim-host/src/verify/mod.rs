@@ -2,8 +2,10 @@
 
 mod case;
 mod checks;
+mod proofs;
 mod suppression;
 
+use crate::instructions::{InLoopError, Instructions};
 use crate::pil::elf::Image;
 use crate::pil::qemu::RunError;
 use crate::pil::telemetry::TelemetryError;
@@ -19,6 +21,8 @@ use std::time::Duration;
 pub struct Options {
     /// The firmware.
     pub image: Image,
+    /// The same compiled with the functions' frames, for the worst stack; or why there is none.
+    pub framed_image: Result<Image, String>,
     /// Vehicle, road, friction, servo and rates of all runs; their speeds and dithers are the job's own.
     pub base: Scenario<f64>,
     /// Length of each main run on the target, s.
@@ -74,6 +78,9 @@ pub enum VerifyError {
         /// Why.
         source: TelemetryError,
     },
+    /// The run in the loop.
+    #[error("in the loop: {0}")]
+    InLoop(#[from] InLoopError),
     /// No place for telemetry.
     #[error("cannot make a temporary folder: {0}")]
     Folder(std::io::Error),
@@ -88,6 +95,8 @@ pub struct Verification {
     pub runs: Vec<RunReport>,
     /// Runs before and after dither.
     pub pairs: Vec<Pair>,
+    /// Title and instructions of the run in the loop.
+    pub further_instructions: Vec<(String, Instructions)>,
     /// Facts about image and runs.
     pub notes: Vec<(String, String)>,
 }
@@ -133,11 +142,15 @@ pub fn verify(
     }
     checks.extend(suppression::checks(&outcomes));
     checks.extend(checks::resources(&options.image, &outcomes));
+    checks.extend(proofs::stack(options, &outcomes));
+    let in_loop = proofs::in_loop(options)?;
+    checks.push(checks::load("load-in-loop/ecu".into(), &in_loop));
     Ok(Verification {
         verdict: Verdict::over(checks),
         pairs: suppression::pairs(&outcomes),
         notes: checks::notes(&options.image, &outcomes),
         runs: outcomes.iter().map(Outcome::report).collect(),
+        further_instructions: vec![(proofs::IN_LOOP_TITLE.into(), in_loop)],
     })
 }
 

@@ -74,12 +74,17 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
             .into(),
         svg: one_step_defect::draw(input.runs)?,
     });
+    let runs = input.runs.iter();
+    let runs = runs.map(|run| (run.title.as_str(), &run.instructions));
+    let further = input.further_instructions.iter();
+    let further = further.map(|(title, instructions)| (title.as_str(), instructions));
+    let rows: Vec<_> = runs.chain(further).collect();
     figures.push(Figure {
         name: "instructions".into(),
         caption: "How often the control task, and the slowest PWM task of each step, took how \
             many instructions."
             .into(),
-        svg: instructions::draw(input.runs)?,
+        svg: instructions::draw(&rows)?,
     });
     Ok(figures)
 }
@@ -141,7 +146,7 @@ mod tests {
         run.divergence = vec![(0.0, 0.0); 3];
         run.horizon_s = Some([f64::NAN, 1.0, 1e9]);
         run.dither_start_s = Some(1e9);
-        run.control_instructions = vec![(0, 0), (u32::MAX, u64::MAX)];
+        run.instructions.control = vec![(0, 0), (u32::MAX, u64::MAX)];
         assert_eq!(figures_of(run).len(), 6);
     }
 
