@@ -112,7 +112,7 @@ impl CallGraph {
         let mut address = range.start;
         while address < range.end {
             if marks.is_data(address) {
-                self.note_pointer(code.word(address).filter(|_| address % 4 == 0));
+                self.note_pointer(code.word(address).filter(|_| address.is_multiple_of(4)));
                 address += 2;
                 continue;
             }
