@@ -216,7 +216,7 @@ fn other_versions_are_refused() {
     let next = forged(encode_header(&header), &[(1, VERSION as u8 + 1)]);
     let error = Header::decode(&next).unwrap_err();
     assert_eq!(error, FrameError::Version(VERSION + 1));
-    assert_eq!(error.to_string(), "format version 2; this program reads 1");
+    assert_eq!(error.to_string(), "format version 3; this program reads 2");
 }
 
 /// A mode that does not exist is no damage that the checksum can see.
