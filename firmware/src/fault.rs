@@ -14,17 +14,20 @@ pub fn end_safely(code: ExitCode) -> ! {
     exit(code)
 }
 
+// SAFETY: touches only atomics, device registers and the host, so it may interrupt anything; and it does not return.
 #[exception]
 unsafe fn HardFault(_frame: &ExceptionFrame) -> ! {
     end_safely(ExitCode::HardFault)
 }
 
 /// The watchdog's interrupt.
+// SAFETY: as above.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
     end_safely(ExitCode::Watchdog)
 }
 
+// SAFETY: as above.
 #[exception]
 unsafe fn DefaultHandler(_number: i16) -> ! {
     end_safely(ExitCode::UnexpectedInterrupt)

@@ -23,5 +23,6 @@ pub mod link;
 pub mod log;
 pub mod open_loop;
 pub mod recorder;
+pub mod spacing;
 pub mod stack;
 pub mod tasks;

@@ -82,8 +82,10 @@ unsafe impl defmt::Logger for Logger {
         frame.encoder.start_frame(|bytes| frame.buffer.push(bytes));
     }
 
+    // SAFETY: does nothing.
     unsafe fn flush() {}
 
+    // SAFETY: defmt calls it only behind acquire, as the trait demands.
     unsafe fn release() {
         // SAFETY: the critical section of acquire is still held.
         let frame = unsafe { &mut *FRAME.0.get() };
@@ -94,6 +96,7 @@ unsafe impl defmt::Logger for Logger {
         unsafe { critical_section::release(restore) };
     }
 
+    // SAFETY: defmt calls it only between acquire and release, as the trait demands.
     unsafe fn write(bytes: &[u8]) {
         // SAFETY: the critical section of acquire is still held.
         let frame = unsafe { &mut *FRAME.0.get() };

@@ -3,7 +3,7 @@
 use crate::board::{Board, Current};
 use crate::exit::ExitCode;
 use crate::host_file::{HostFile, HostFileError};
-use crate::stack;
+use crate::{spacing, stack, tasks};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use critical_section::Mutex;
@@ -162,6 +162,7 @@ pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
         return Ok(());
     }
     let (final_duty, neutral_duty) = Current::pwm_output();
+    let (least_spacing, most_spacing) = spacing::extremes();
     let trailer = Trailer {
         exit_code: code as u32,
         records: RECORDS.load(Ordering::Relaxed),
@@ -169,6 +170,8 @@ pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
         stack_bytes: stack::deepest_bytes(),
         final_duty,
         neutral_duty,
+        least_spacing: tasks::saturate(least_spacing),
+        most_spacing: tasks::saturate(most_spacing),
     };
     let mut bytes = [0; TRAILER_LEN];
     trailer.encode(&mut bytes);

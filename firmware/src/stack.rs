@@ -6,6 +6,7 @@ const PAINT: u32 = 0xC0FF_EE11;
 /// Left unpainted below the painting function's own frame, bytes.
 const MARGIN: usize = 256;
 
+// SAFETY: the linker script defines both. Only their addresses are taken.
 unsafe extern "C" {
     /// End of static RAM and top of the stack, from the linker script.
     static mut __sheap: u32;

@@ -5,7 +5,7 @@
 //! at work. Nothing here can panic: the binary `panic-free` proves it at link time.
 
 use crate::board::{Board, Current};
-use crate::{in_loop, open_loop};
+use crate::{in_loop, open_loop, spacing};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
@@ -21,8 +21,8 @@ static FOREIGN_COST: AtomicU32 = AtomicU32::new(0);
 static SAMPLES: AtomicU32 = AtomicU32::new(0);
 static SAMPLES_A_MS: AtomicU32 = AtomicU32::new(1);
 
-static PWM_START: Mutex<Cell<Option<PwmInterrupt>>> = Mutex::new(Cell::new(None));
-static CONTROL_START: Mutex<Cell<Option<ControlInterrupt>>> = Mutex::new(Cell::new(None));
+static PWM_START: Mutex<Cell<Option<&mut PwmInterrupt>>> = Mutex::new(Cell::new(None));
+static CONTROL_START: Mutex<Cell<Option<&mut ControlInterrupt>>> = Mutex::new(Cell::new(None));
 
 /// What the PWM interrupt works on. By reference: the interrupts' stacks have no room for moving it.
 pub enum PwmInterrupt {
@@ -43,9 +43,12 @@ pub enum ControlInterrupt {
 /// Hands the tasks to their interrupts, which take them at their first call.
 pub fn hand_over(pwm: PwmInterrupt, control: ControlInterrupt, samples_a_ms: u32) {
     SAMPLES_A_MS.store(samples_a_ms.max(1), Ordering::Relaxed);
+    // The interrupts take references: to move a whole task, they would switch each other off for most of a fast PWM's period.
+    let pwm = cortex_m::singleton!(: PwmInterrupt = pwm);
+    let control = cortex_m::singleton!(: ControlInterrupt = control);
     critical_section::with(|cs| {
-        PWM_START.borrow(cs).set(Some(pwm));
-        CONTROL_START.borrow(cs).set(Some(control));
+        PWM_START.borrow(cs).set(pwm);
+        CONTROL_START.borrow(cs).set(control);
     });
 }
 
@@ -93,13 +96,16 @@ pub fn saturate(counts: u32) -> u16 {
 
 #[exception]
 fn SysTick() {
-    static mut INTERRUPT: Option<PwmInterrupt> = None;
+    static mut INTERRUPT: Option<&'static mut PwmInterrupt> = None;
     let start = Current::cost_counter();
-    if INTERRUPT.is_none() {
+    if INTERRUPT.is_some() {
+        spacing::note(start);
+    } else {
         *INTERRUPT = critical_section::with(|cs| PWM_START.borrow(cs).take());
+        spacing::begin(start);
     }
     SAMPLES.fetch_add(1, Ordering::Relaxed);
-    match INTERRUPT {
+    match INTERRUPT.as_deref_mut() {
         Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),
         None => {}
@@ -111,11 +117,11 @@ fn SysTick() {
 
 #[exception]
 fn PendSV() {
-    static mut INTERRUPT: Option<ControlInterrupt> = None;
+    static mut INTERRUPT: Option<&'static mut ControlInterrupt> = None;
     if INTERRUPT.is_none() {
         *INTERRUPT = critical_section::with(|cs| CONTROL_START.borrow(cs).take());
     }
-    match INTERRUPT {
+    match INTERRUPT.as_deref_mut() {
         Some(ControlInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(ControlInterrupt::InLoop(interrupt)) => interrupt.run(),
         None => {}

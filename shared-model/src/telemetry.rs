@@ -10,7 +10,7 @@ use core::fmt;
 use nalgebra::Vector4;
 
 /// Version of the format; a reader refuses any other.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 
 const CHECKSUM: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
 
@@ -23,7 +23,7 @@ pub const HEADER_LEN: usize = 1 + 35 + 2;
 /// Encoded length of a record without its duty codes, bytes.
 pub const RECORD_FIXED_LEN: usize = 1 + 25 + 2;
 /// Encoded length of a trailer, bytes.
-pub const TRAILER_LEN: usize = 1 + 20 + 2;
+pub const TRAILER_LEN: usize = 1 + 24 + 2;
 
 /// Encoded length of a record with its duty codes, bytes.
 pub const fn record_len(samples_per_step: u16) -> usize {
@@ -75,6 +75,11 @@ pub struct Trailer {
     pub final_duty: u16,
     /// Duty code of no voltage.
     pub neutral_duty: u16,
+    /// Least and most counts of the cost clock from one PWM interrupt to the next, saturated; the least is above the most
+    /// where there were no two.
+    pub least_spacing: u16,
+    /// See there.
+    pub most_spacing: u16,
 }
 
 /// Why a frame cannot be read.
@@ -329,6 +334,8 @@ impl Trailer {
         writer.u32(self.stack_bytes);
         writer.u16(self.final_duty);
         writer.u16(self.neutral_duty);
+        writer.u16(self.least_spacing);
+        writer.u16(self.most_spacing);
         writer.finish()
     }
 
@@ -345,6 +352,8 @@ impl Trailer {
             stack_bytes: reader.u32(),
             final_duty: reader.u16(),
             neutral_duty: reader.u16(),
+            least_spacing: reader.u16(),
+            most_spacing: reader.u16(),
         })
     }
 }

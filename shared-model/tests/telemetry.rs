@@ -41,8 +41,9 @@ prop_compose! {
 prop_compose! {
     fn trailer()(
         exit_code: u32, records: u32, overruns: u32, stack_bytes: u32, final_duty: u16, neutral_duty: u16,
+        least_spacing: u16, most_spacing: u16,
     ) -> Trailer {
-        Trailer { exit_code, records, overruns, stack_bytes, final_duty, neutral_duty }
+        Trailer { exit_code, records, overruns, stack_bytes, final_duty, neutral_duty, least_spacing, most_spacing }
     }
 }
 
@@ -185,8 +186,8 @@ fn lengths_are_the_constants() {
     );
     assert_eq!(
         (HEADER_LEN, RECORD_FIXED_LEN, TRAILER_LEN),
-        (38, 28, 23),
-        "as version 1 has them"
+        (38, 28, 27),
+        "as version 2 has them"
     );
 }
 
@@ -215,7 +216,7 @@ fn other_versions_are_refused() {
     let next = forged(encode_header(&header), &[(1, VERSION as u8 + 1)]);
     let error = Header::decode(&next).unwrap_err();
     assert_eq!(error, FrameError::Version(VERSION + 1));
-    assert_eq!(error.to_string(), "format version 2; this program reads 1");
+    assert_eq!(error.to_string(), "format version 3; this program reads 2");
 }
 
 /// A mode that does not exist is no damage that the checksum can see.

@@ -14,6 +14,8 @@
 //! | how does the vehicle move under the ECU's duty, and what do its sensors tell? | [`closed_loop`] |
 //! | how is the firmware run? | [`pil`] |
 //! | do firmware and host agree? | [`equivalence`] |
+//! | how many instructions do its tasks take? | [`instructions`] |
+//! | how deep can the firmware's stack get, and does it fit its board? | [`image`] |
 //! | what does a whole verification do? | [`verify`] |
 //! | how are configurations read? | [`config`] |
 //! | how are results shown? | [`report`], [`verdict`] |
@@ -27,6 +29,8 @@ pub mod config;
 pub mod convergence;
 pub mod engine;
 pub mod equivalence;
+pub mod image;
+pub mod instructions;
 pub mod motion;
 pub mod paper;
 pub mod pil;

@@ -308,6 +308,8 @@ fn telemetry() -> Vec<u8> {
         stack_bytes: 1000,
         final_duty: 1250,
         neutral_duty: 1250,
+        least_spacing: 2499,
+        most_spacing: 2501,
     };
     let length = trailer.encode(&mut buffer);
     stream.extend(&buffer[..length]);

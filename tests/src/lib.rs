@@ -1,5 +1,7 @@
 //! Runs of the firmware's images in QEMU, for the tests.
 
+pub mod golden;
+
 use shared_model::Scenario;
 use sim_host::pil::elf::Image;
 use sim_host::pil::qemu::{self, Finished, Machine, RunError};
@@ -27,16 +29,33 @@ pub fn image(name: &str) -> Image {
 /// # Panics
 /// If it is not built: a test that cannot run has not passed.
 pub fn board_image(board: &str, name: &str) -> Image {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .expect("the tests are in the workspace");
-    let target =
-        std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from);
     // Every board but the usual one has a target folder of its own.
-    let target = match board {
-        USUAL_BOARD => target,
-        _ => target.join("boards").join(board),
-    };
+    match board {
+        USUAL_BOARD => open(&target(), name),
+        _ => open(&target().join("boards").join(board), name),
+    }
+}
+
+/// The ECU's image for a board, compiled with the functions' frames.
+///
+/// # Panics
+/// If it is not built: a test that cannot run has not passed.
+pub fn framed_image(board: &str) -> Image {
+    open(&target().join("stack-sizes").join(board), "ecu")
+}
+
+/// The workspace's folder.
+pub fn root() -> &'static Path {
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    tests.parent().expect("the tests are in the workspace")
+}
+
+/// Where cargo puts what it builds.
+fn target() -> PathBuf {
+    std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), PathBuf::from)
+}
+
+fn open(target: &Path, name: &str) -> Image {
     let path = target.join("thumbv7em-none-eabihf/firmware").join(name);
     Image::open(&path).unwrap_or_else(|error| panic!("{error} (or run `cargo xtask test`)"))
 }

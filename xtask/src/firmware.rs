@@ -1,7 +1,7 @@
 //! Builds the firmware, with the toolchain that has the target.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result};
@@ -32,6 +32,10 @@ pub fn build(toolchain: &str, board: &str, selection: &[&str]) -> Result<()> {
 
 /// A command of cargo on the firmware for a board, in the firmware's folder, where its own configuration holds.
 pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
+    cargo_into(toolchain, command, board, &target_dir(board)?)
+}
+
+fn cargo_into(toolchain: &str, command: &str, board: &str, target_dir: &Path) -> Result<Command> {
     let mut cargo = rustup::cargo(toolchain)?;
     cargo
         .current_dir(workspace::firmware())
@@ -41,7 +45,7 @@ pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
         .arg("--no-default-features")
         .arg(format!("--features=board-{board}"))
         .arg("--target-dir")
-        .arg(target_dir(board)?);
+        .arg(target_dir);
     // These would replace what that configuration says: its target, and its linker arguments.
     for variable in [
         "RUSTFLAGS",
@@ -52,6 +56,30 @@ pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
         cargo.env_remove(variable);
     }
     Ok(cargo)
+}
+
+/// A build of the ECU's program with a section `.stack_sizes`, the frame of each function, in a folder of its own.
+///
+/// The option is not stable yet. For one crate alone it may be used all the same, and as that crate's compilation makes the
+/// code of all others, too, the frames are those of the whole program. The code is that of [`build`].
+pub fn framed(toolchain: &str, board: &str) -> Result<Command> {
+    let mut cargo = cargo_into(toolchain, "rustc", board, &framed_target_dir(board)?)?;
+    cargo
+        .env("RUSTC_BOOTSTRAP", "ecu")
+        .args(["--bin", "ecu", "--", "-Zemit-stack-sizes"]);
+    Ok(cargo)
+}
+
+/// What [`framed`] builds.
+pub fn framed_elf(board: &str) -> Result<PathBuf> {
+    Ok(framed_target_dir(board)?
+        .join(TARGET)
+        .join("firmware")
+        .join("ecu"))
+}
+
+fn framed_target_dir(board: &str) -> Result<PathBuf> {
+    Ok(workspace::target_dir()?.join("stack-sizes").join(board))
 }
 
 /// The ECU's program for a board.

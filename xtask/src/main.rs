@@ -30,6 +30,7 @@ use clap::{Parser, Subcommand};
 #[command(
     after_help = "Examples:\n  cargo xtask demo     set up, build, run the firmware in QEMU, write the report\n  \
                         cargo xtask test     set up, build, run every test\n  \
+                        cargo xtask proofs   worst stack, sizes, instructions of the firmware\n  \
                         cargo xtask doctor   what is there, what is missing\n\n\
                         `cargo xtask help COMMAND` shows a command's own examples."
 )]
@@ -70,6 +71,18 @@ enum Command {
     #[command(after_help = "Example:\n  cargo xtask test")]
     Test,
 
+    /// Builds every board's firmware, proves what can be proved of it, and compares it with tests/golden.
+    ///
+    /// Panic-free link, worst stack, flash and RAM, instructions of the tasks, spacing of the interrupts, and a reason for
+    /// every `unsafe`.
+    #[command(after_help = "Examples:\n  cargo xtask proofs\n  \
+                            cargo xtask proofs --overwrite-expected && git diff tests/golden")]
+    Proofs {
+        /// Write the figures into tests/golden instead of comparing them; limits hold all the same.
+        #[arg(long)]
+        overwrite_expected: bool,
+    },
+
     /// Checks the format, and runs clippy on host and firmware; warnings are errors.
     #[command(after_help = "Example:\n  cargo xtask lint")]
     Lint,
@@ -106,6 +119,7 @@ fn main() -> ExitCode {
         Command::Setup => jobs::setup::run(),
         Command::Demo { args } => jobs::demo::run(&args),
         Command::Test => jobs::test::run(),
+        Command::Proofs { overwrite_expected } => jobs::proofs::run(overwrite_expected),
         Command::Lint => jobs::lint::run(),
         Command::Firmware { board } => jobs::firmware::run(&board),
         Command::Coverage => jobs::coverage::run(),

@@ -11,6 +11,7 @@ use core::panic::PanicInfo;
 use core::ptr::read_volatile;
 use firmware::tasks::{self, ControlInterrupt, PwmInterrupt};
 
+// SAFETY: there is no such function; where it is called, the link fails.
 unsafe extern "C" {
     fn a_panic_is_reachable_from_the_control_path() -> !;
 }
@@ -18,6 +19,7 @@ unsafe extern "C" {
 /// Somewhere in RAM, so that the optimiser cannot know the tasks.
 const ANYWHERE: usize = 0x2000_8000;
 
+// SAFETY: the start-up code calls the function of this name, and there is no other.
 #[unsafe(no_mangle)]
 extern "C" fn main() -> ! {
     // SAFETY: none; this image is linked, not run.

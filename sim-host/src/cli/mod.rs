@@ -6,6 +6,7 @@ mod config;
 mod convergence;
 mod decode;
 mod equilibria;
+mod image;
 mod lyapunov;
 mod nonlinearity;
 mod orbit;
@@ -73,6 +74,7 @@ enum Command {
     Realisability(realisability::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
+    Image(image::Arguments),
     Qemu(qemu::Arguments),
 }
 
@@ -119,6 +121,7 @@ pub fn main() -> ExitCode {
         Command::Realisability(arguments) => realisability::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
+        Command::Image(arguments) => image::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),
     };
     match done {

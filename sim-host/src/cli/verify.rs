@@ -34,6 +34,16 @@ pub struct Arguments {
         default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
     )]
     firmware: PathBuf,
+    /// The same compiled with the functions' frames, for the worst stack; `cargo xtask proofs` builds it
+    #[arg(
+        long,
+        value_name = "ELF",
+        default_value = "target/stack-sizes/mps2/thumbv7em-none-eabihf/firmware/ecu"
+    )]
+    stack_sizes: PathBuf,
+    /// Folder with the recorded proofs, which the report shows
+    #[arg(long, value_name = "FOLDER", default_value = "tests/golden")]
+    proofs: PathBuf,
     /// Folder for the report
     #[arg(long, value_name = "FOLDER", default_value = "target/report")]
     out: PathBuf,
@@ -64,6 +74,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let options = Options {
         time_out: time_out(arguments.time_out)?,
         image: Image::open(&arguments.firmware)?,
+        framed_image: Image::open(&arguments.stack_sizes).map_err(|error| error.to_string()),
         base,
         duration_s,
     };
@@ -73,7 +84,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 
     let start = Instant::now();
     let verification = with_progress(&options)?;
-    write_report(&arguments.out, &verification)?;
+    let proofs = recorded(&arguments.proofs);
+    write_report(&arguments.out, &verification, &proofs)?;
     show(&verification, &arguments.out, start.elapsed());
     Ok(if verification.verdict.passed() {
         Done::Well
@@ -107,13 +119,33 @@ fn with_progress(options: &Options) -> anyhow::Result<Verification> {
     Ok(verification?)
 }
 
-fn write_report(folder: &Path, verification: &Verification) -> anyhow::Result<()> {
+/// The recorded proofs by name; none without a checkout.
+fn recorded(folder: &Path) -> Vec<(String, String)> {
+    let files = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut proofs: Vec<(String, String)> = files
+        .map(|file| file.path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "txt"))
+        .filter_map(|path| {
+            let name = path.file_stem()?.to_string_lossy().into_owned();
+            Some((name, std::fs::read_to_string(&path).ok()?))
+        })
+        .collect();
+    proofs.sort();
+    proofs
+}
+
+fn write_report(
+    folder: &Path,
+    verification: &Verification,
+    proofs: &[(String, String)],
+) -> anyhow::Result<()> {
     let input = ReportInput {
         title: "Steering ECU: firmware against host, and chaos suppressed by dither",
         verdict: &verification.verdict,
         runs: &verification.runs,
         pairs: &verification.pairs,
         drives: &verification.drives,
+        proofs,
         notes: &verification.notes,
     };
     report::write(folder, &input)

@@ -17,6 +17,8 @@ pub struct Image {
     pub flash_bytes: u64,
     /// RAM that its static variables take, bytes; the stack comes on top.
     pub ram_bytes: u64,
+    /// The compiler that it was built with, as it calls itself; empty if it does not say.
+    pub compiler: String,
 }
 
 /// Why a file is no image.
@@ -76,8 +78,10 @@ impl Image {
             });
         }
         let (flash_bytes, ram_bytes) = sizes(&file);
+        let compiler = compiler(&file);
         Ok(Self {
             path,
+            compiler,
             flash_bytes,
             ram_bytes,
             bytes,
@@ -92,6 +96,17 @@ impl Image {
         let thumb = u64::from(symbol.kind() == object::SymbolKind::Text);
         u32::try_from(symbol.address() & !thumb).ok()
     }
+}
+
+/// The compiler's line among those of all tools that had a hand in it.
+fn compiler(file: &object::File<'_>) -> String {
+    let section = file.section_by_name(".comment");
+    let bytes = section
+        .and_then(|section| section.data().ok())
+        .unwrap_or_default();
+    let mut lines = bytes.split(|&byte| byte == 0).map(String::from_utf8_lossy);
+    let compiler = lines.find(|line| line.starts_with("rustc"));
+    compiler.map(String::from).unwrap_or_default()
 }
 
 fn sizes(file: &object::File<'_>) -> (u64, u64) {

@@ -76,11 +76,16 @@ impl Machine {
 
     /// Virtual time is counted in instructions, and idle time is skipped: the same run every time. An instruction takes 2^5
     /// ns; on the STM32F405 2^3 ns, because its timers run some ten times faster than the program believes.
-    fn instruction_counting(self) -> &'static str {
+    fn instruction_shift(self) -> u32 {
         match self {
-            Self::Mps2An386 | Self::Mps2An500 => "shift=5,align=off,sleep=off",
-            Self::NetduinoPlus2 => "shift=3,align=off,sleep=off",
+            Self::Mps2An386 | Self::Mps2An500 => 5,
+            Self::NetduinoPlus2 => 3,
         }
+    }
+
+    /// Instructions that it executes in a second of its time.
+    pub fn instruction_rate_hz(self) -> f64 {
+        1e9 / f64::from(1 << self.instruction_shift())
     }
 }
 
@@ -239,7 +244,11 @@ pub(super) fn start(
     command
         .args(["-machine", machine.name(), "-display", "none"])
         .args(["-monitor", "none"])
-        .args(["-icount", machine.instruction_counting()])
+        .arg("-icount")
+        .arg(format!(
+            "shift={},align=off,sleep=off",
+            machine.instruction_shift()
+        ))
         .args(options)
         .args(["-semihosting-config", &semihosting])
         .arg("-kernel")

@@ -31,6 +31,7 @@ pub fn page(input: &ReportInput, figures: &[Figure]) -> Markup {
         nav {
             a href="#checks" { "Checks" }
             @if !input.notes.is_empty() { a href="#notes" { "Notes" } }
+            @if !input.proofs.is_empty() { a href="#proofs" { "Firmware proofs" } }
             a href="#figures" { "Figures" }
         }
         h2 #checks { "Checks" }
@@ -38,6 +39,10 @@ pub fn page(input: &ReportInput, figures: &[Figure]) -> Markup {
         @if !input.notes.is_empty() {
             h2 #notes { "Notes" }
             (notes(input.notes))
+        }
+        @if !input.proofs.is_empty() {
+            h2 #proofs { "Firmware proofs" }
+            (proofs(input.proofs))
         }
         h2 #figures { "Figures" }
         @for figure in figures {
@@ -145,6 +150,22 @@ fn notes(notes: &[(String, String)]) -> Markup {
     }
 }
 
+fn proofs(proofs: &[(String, String)]) -> Markup {
+    html! {
+        p {
+            "As recorded in the repository, where the tests compare them with the present firmware. What this run itself \
+             measured of stack, memory, instructions and interrupts is among the checks, under \u{201c}ecu\u{201d} and under each \
+             run."
+        }
+        @for (name, text) in proofs {
+            details {
+                summary { (name) }
+                pre { (text) }
+            }
+        }
+    }
+}
+
 /// Dark on white; the status colours have a contrast of at least 7 to 1 with their text.
 const STYLE: &str = "
 :root { color-scheme: only light; }
@@ -171,6 +192,7 @@ tbody th.group { font-weight: bold; padding-top: 1rem; }
 td.figure, .status { white-space: nowrap; font-variant-numeric: tabular-nums; }
 .status { display: inline-block; padding: 0 0.5rem; border: 1px solid; border-radius: 0.3rem; }
 td.detail { font-size: 0.9rem; color: #404040; overflow-wrap: anywhere; }
+pre { overflow-x: auto; font-size: 0.85rem; line-height: 1.3; }
 .notes { width: auto; }
 .notes td { overflow-wrap: anywhere; font-variant-numeric: tabular-nums; }
 figure { margin: 0 0 2rem; break-inside: avoid; }

@@ -14,6 +14,7 @@ pub use figure::drive::draw as drive;
 pub use figure::schedule_map::draw as schedule_map;
 
 use crate::closed_loop::run::Run;
+use crate::instructions::Instructions;
 use crate::trace::Trace;
 use crate::verdict::Verdict;
 use anyhow::{Context, ensure};
@@ -41,10 +42,8 @@ pub struct RunReport {
     pub horizon_s: Option<[f64; 3]>,
     /// Distance at which they count as parted, or which they must never reach.
     pub divergence_limit: f64,
-    /// Instructions of each control task, and how often: ascending.
-    pub control_instructions: Vec<(u32, u64)>,
-    /// Instructions of the slowest PWM task in each step, and how often: ascending.
-    pub pwm_instructions: Vec<(u32, u64)>,
+    /// What its tasks took.
+    pub instructions: Instructions,
 }
 
 /// Two runs that differ in nothing but the dither.
@@ -67,6 +66,8 @@ pub struct DriveReport {
     pub title: String,
     /// The firmware's run.
     pub run: Run,
+    /// Instructions of its tasks.
+    pub instructions: Instructions,
 }
 
 /// Everything that a report shows.
@@ -82,6 +83,8 @@ pub struct ReportInput<'a> {
     pub pairs: &'a [Pair],
     /// Manoeuvres with the ECU in the loop.
     pub drives: &'a [DriveReport],
+    /// Name and text of recorded proofs about the firmware.
+    pub proofs: &'a [(String, String)],
     /// Name and value of further facts: memory use, toolchain, revision.
     pub notes: &'a [(String, String)],
 }

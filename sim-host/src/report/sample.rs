@@ -1,6 +1,7 @@
 //! Made-up runs of realistic shape, for tests.
 
 use super::{Pair, ReportInput, RunReport};
+use crate::instructions::Instructions;
 use crate::trace::Trace;
 use crate::verdict::{Check, Verdict};
 use nalgebra::Vector4;
@@ -96,6 +97,7 @@ pub fn input<'a>(
         runs,
         pairs,
         drives: &[],
+        proofs: &[],
         notes: &NOTES,
     }
 }
@@ -107,8 +109,7 @@ pub fn empty_run() -> RunReport {
     run.trace.duties.clear();
     run.one_step_defect.clear();
     run.divergence.clear();
-    run.control_instructions.clear();
-    run.pwm_instructions.clear();
+    run.instructions = Instructions::default();
     run
 }
 
@@ -161,10 +162,14 @@ fn run(id: &str, title: &str, dither_counts: impl Fn(f64) -> f64, dithered: bool
             .collect(),
         horizon_s: (!dithered).then_some([30.0, 38.0, 46.0]),
         divergence_limit: if dithered { 1e-3 } else { 0.1 },
-        control_instructions: (0..40)
-            .map(|n| (4120 + 3 * n, 1 + 20_000 / (1 + u64::from(n).pow(3))))
-            .collect(),
-        pwm_instructions: vec![(212, 3), (214, 59_000), (231, 990), (260, 7)],
+        instructions: Instructions {
+            control: (0..40)
+                .map(|n| (4120 + 3 * n, 1 + 20_000 / (1 + u64::from(n).pow(3))))
+                .collect(),
+            pwm: vec![(212, 3), (214, 59_000), (231, 990), (260, 7)],
+            periods_a_tick: 10,
+            tick: 31_250.0,
+        },
     }
 }
 

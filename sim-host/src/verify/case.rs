@@ -4,6 +4,7 @@ use super::{Options, Progress, VerifyError};
 use crate::chaos::lyapunov::{self, Exponent};
 use crate::chaos::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
 use crate::equivalence::{self, Bits, OneStep};
+use crate::instructions::Instructions;
 use crate::pil::qemu::{self, Finished, Machine, RunError};
 use crate::pil::settings;
 use crate::pil::telemetry::Recording;
@@ -14,7 +15,6 @@ use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::servo::Pwm;
 use shared_model::telemetry::record_len;
-use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
@@ -347,27 +347,7 @@ impl Outcome {
                 super::checks::NEVER_PART
             },
             horizon_s,
-            control_instructions: self.control_instructions(),
-            pwm_instructions: self.pwm_instructions(),
+            instructions: Instructions::of(&self.recording),
         }
-    }
-
-    /// How often the control task took how many instructions, ascending.
-    pub(super) fn control_instructions(&self) -> Vec<(u32, u64)> {
-        self.histogram(|record| record.control_cost)
-    }
-
-    /// How often the slowest PWM task of a step took how many instructions, ascending.
-    pub(super) fn pwm_instructions(&self) -> Vec<(u32, u64)> {
-        self.histogram(|record| record.pwm_cost)
-    }
-
-    fn histogram(&self, cost: impl Fn(&shared_model::telemetry::Record) -> u16) -> Vec<(u32, u64)> {
-        let mut histogram = BTreeMap::new();
-        for record in &self.recording.records {
-            let instructions = self.recording.instructions(cost(record));
-            *histogram.entry(instructions).or_insert(0) += 1;
-        }
-        histogram.into_iter().collect()
     }
 }

@@ -3,6 +3,7 @@
 use super::case::{Analysis, DITHER_TRANSIENT_S, Expected, Outcome, Role};
 use crate::chaos::period::mean_cycle_s;
 use crate::equivalence;
+use crate::instructions::{Instructions, median, most};
 use crate::pil::elf::Image;
 use crate::verdict::{Check, figure};
 
@@ -10,9 +11,11 @@ use crate::verdict::{Check, figure};
 /// as parted.
 pub(super) const NEVER_PART: f64 = 1e-3;
 /// What a mid-size microcontroller spares for the ECU's program.
-const STACK_LIMIT_BYTES: f64 = 4096.0;
+const STACK_LIMIT_BYTES: f64 = 16.0 * 1024.0;
 const FLASH_LIMIT_BYTES: f64 = 128.0 * 1024.0;
 const RAM_LIMIT_BYTES: f64 = 64.0 * 1024.0;
+/// A PWM interrupt that is late by as much moves the dither's edges by a hundredth of a PWM period.
+const JITTER_LIMIT_PERCENT: f64 = 1.0;
 
 /// The checks of one case.
 pub(super) fn of(outcome: &Outcome) -> Vec<Check> {
@@ -184,7 +187,14 @@ pub(super) fn resources(image: &Image, outcomes: &[Outcome]) -> Vec<Check> {
         .iter()
         .map(|outcome| outcome.recording.trailer.stack_bytes)
         .max();
-    let mut checks: Vec<Check> = outcomes.iter().map(load).collect();
+    let mut checks: Vec<Check> = Vec::new();
+    for outcome in outcomes {
+        checks.push(load(
+            id("load", outcome),
+            &Instructions::of(&outcome.recording),
+        ));
+        checks.push(jitter(outcome));
+    }
     checks.push(
         Check::at_most(
             "stack/ecu",
@@ -209,46 +219,51 @@ pub(super) fn resources(image: &Image, outcomes: &[Outcome]) -> Vec<Check> {
     checks
 }
 
-/// Share of a model step's instructions that its tasks take at worst.
-fn load(outcome: &Outcome) -> Check {
-    let header = &outcome.recording.header;
-    let budget = f64::from(header.instruction_rate_hz) / f64::from(header.step_rate_hz);
-    let (control, pwm) = (outcome.control_instructions(), outcome.pwm_instructions());
-    let samples = f64::from(header.samples_per_step);
-    let worst = most(&control) + samples * most(&pwm);
+/// Share of a control tick's instructions that its tasks take at worst.
+pub(super) fn load(id: String, instructions: &Instructions) -> Check {
+    let Instructions {
+        control,
+        pwm,
+        periods_a_tick,
+        tick,
+    } = instructions;
     Check::at_most(
-        id("load", outcome),
+        id,
         "Worst case of control and PWM tasks, share of the period",
-        100.0 * worst / budget,
+        100.0 * instructions.worst_share(),
         100.0,
     )
     .unit("%")
     .detail(format!(
-        "instructions, not cycles: control task median {}, most {}; PWM task (the slowest of a step) median {}, most {}; a step \
-         of {} samples has {budget} at {} million a second",
-        median(&control),
-        most(&control),
-        median(&pwm),
-        most(&pwm),
-        samples,
-        f64::from(header.instruction_rate_hz) / 1e6
+        "instructions, not cycles: control task median {}, most {}; PWM task (the slowest of a tick) median {}, most {}; a tick \
+         of {periods_a_tick} PWM periods has {tick}",
+        median(control),
+        most(control),
+        median(pwm),
+        most(pwm),
     ))
 }
 
-fn most(histogram: &[(u32, u64)]) -> f64 {
-    histogram.last().map_or(0.0, |&(count, _)| count.into())
-}
-
-fn median(histogram: &[(u32, u64)]) -> u32 {
-    let total: u64 = histogram.iter().map(|&(_, times)| times).sum();
-    let mut seen = 0;
-    for &(count, times) in histogram {
-        seen += times;
-        if 2 * seen >= total {
-            return count;
-        }
-    }
-    0
+/// How far the spacing of PWM interrupts strays, by a timer that is not their clock.
+fn jitter(outcome: &Outcome) -> Check {
+    let (header, trailer) = (&outcome.recording.header, &outcome.recording.trailer);
+    let (least, most) = (trailer.least_spacing, trailer.most_spacing);
+    let spread = f64::from(most) - f64::from(least);
+    let period = f64::from(header.cost_clock_hz)
+        / (f64::from(header.step_rate_hz) * f64::from(header.samples_per_step));
+    Check::at_most(
+        id("jitter", outcome),
+        "PWM interrupts: spread of their spacing, share of the period",
+        100.0 * spread / period,
+        JITTER_LIMIT_PERCENT,
+    )
+    .unit("%")
+    .detail(format!(
+        "{least} to {most} counts of an independent timer of {} MHz between {} interrupts, nominally {period}; in the emulator's \
+         time, which is counted in instructions",
+        f64::from(header.cost_clock_hz) / 1e6,
+        outcome.recording.duties.len()
+    ))
 }
 
 /// Facts about the image and the runs.

@@ -1,9 +1,11 @@
 //! The ECU in the loop: does the firmware command what its program commands on the host, with a vehicle that answers?
 
+use super::checks::load;
 use super::{Options, Progress, VerifyError};
 use crate::closed_loop::levels::{Levels, Target, drive};
 use crate::closed_loop::manoeuvre::Manoeuvre;
 use crate::closed_loop::run::Comparison;
+use crate::instructions::Instructions;
 use crate::pil::qemu::{Machine, RunError};
 use crate::pil::session::LinkKind;
 use crate::report::DriveReport;
@@ -62,12 +64,15 @@ fn one(
         }
     })?;
     let id = format!("in-loop-{name}");
-    let checks = checks(&id, &levels);
+    let instructions = Instructions::in_loop(&levels.processor.costs, &scenario, target.machine);
+    let mut checks = checks(&id, &levels);
+    checks.push(load(format!("load/{id}"), &instructions));
     on_progress(Progress::Done(format!("{}: driven", levels.name)));
     let report = DriveReport {
         id,
         title: levels.name,
         run: levels.processor.run,
+        instructions,
     };
     Ok((checks, report))
 }

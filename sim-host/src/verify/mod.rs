@@ -3,6 +3,7 @@
 mod case;
 mod checks;
 mod in_loop;
+mod proofs;
 mod suppression;
 
 use crate::pil::elf::Image;
@@ -20,6 +21,8 @@ use std::time::Duration;
 pub struct Options {
     /// The firmware.
     pub image: Image,
+    /// The same compiled with the functions' frames, for the worst stack; or why there is none.
+    pub framed_image: Result<Image, String>,
     /// Vehicle, road, friction, servo and rates of all runs; their speeds and dithers are the job's own.
     pub base: Scenario<f64>,
     /// Length of each main run on the target, s.
@@ -146,6 +149,7 @@ pub fn verify(
     let (in_loop, drives) = in_loop::run(options, &on_progress)?;
     checks.extend(in_loop);
     checks.extend(checks::resources(&options.image, &outcomes));
+    checks.extend(proofs::stack(options, &outcomes));
     Ok(Verification {
         verdict: Verdict::over(checks),
         pairs: suppression::pairs(&outcomes),

@@ -55,10 +55,10 @@ impl Board for NucleoG474re {
         let (_, neutral) = Self::pwm_output();
         // SAFETY: writes to two registers of the timer, each of which is right at any time.
         let timer = unsafe { &*pac::TIM3::ptr() };
-        // SAFETY: as above; the register takes any duty.
-        timer
-            .ccr1()
-            .write(|w| unsafe { w.ccr().bits(neutral.into()) });
+        timer.ccr1().write(|w| {
+            // SAFETY: the register takes any duty.
+            unsafe { w.ccr().bits(neutral.into()) }
+        });
         // Takes the duty over now, and not only when the period is over.
         timer.egr().write(|w| w.ug().set_bit());
     }
@@ -107,7 +107,10 @@ impl Board for NucleoG474re {
         // SAFETY: nothing else uses the UART.
         let uart = unsafe { &*pac::USART1::ptr() };
         while uart.isr().read().txe().bit_is_clear() {}
-        uart.tdr().write(|w| unsafe { w.bits(byte.into()) });
+        uart.tdr().write(|w| {
+            // SAFETY: the register takes any byte.
+            unsafe { w.bits(byte.into()) }
+        });
     }
 
     fn uart_receive() -> Option<u8> {

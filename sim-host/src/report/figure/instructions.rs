@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::panel::{Panel, stack, stack_height};
 use super::style::{Area, MAIN, WIDTH, figure};
-use crate::report::RunReport;
+use crate::instructions::{Histogram, Instructions, most};
 
 /// About the number of bars across a panel.
 const BARS: f64 = 100.0;
@@ -11,29 +11,31 @@ const PANEL: u32 = 190;
 /// Where the count axis begins, so that a count of 1 has a bar.
 const LEAST: f64 = 0.5;
 
-/// Instructions, and how often.
-type Histogram = [(u32, u64)];
 /// Left end, right end and height of a bar.
 type Bar = (f64, f64, f64);
 
 /// The figure: a row for each run, named on the left; there the control task, on the right the PWM task.
-pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
+pub fn draw(runs: &[(&str, &Instructions)]) -> anyhow::Result<String> {
     let heading = "Instructions of the control task (left) and of the PWM task (right)";
     figure(heading, &[], stack_height(runs.len(), PANEL), |area| {
         let (left, right) = area.split_horizontally(WIDTH / 2);
         let control: Vec<Row> = runs
             .iter()
-            .map(|run| Row {
-                caption: run.title.clone(),
-                histogram: &run.control_instructions,
+            .map(|(title, run)| Row {
+                caption: (*title).to_owned(),
+                histogram: &run.control,
             })
             .collect();
         column(&left, "instructions of a control task", &control)?;
         let pwm: Vec<Row> = runs
             .iter()
-            .map(|run| Row {
-                caption: greatest(run),
-                histogram: &run.pwm_instructions,
+            .map(|(_, run)| Row {
+                caption: format!(
+                    "greatest: {} (left), {} (right)",
+                    most(&run.control),
+                    most(&run.pwm)
+                ),
+                histogram: &run.pwm,
             })
             .collect();
         column(&right, "instructions of a PWM task", &pwm)
@@ -43,14 +45,6 @@ pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
 struct Row<'a> {
     caption: String,
     histogram: &'a Histogram,
-}
-
-fn greatest(run: &RunReport) -> String {
-    let control = run.control_instructions.last();
-    match control.zip(run.pwm_instructions.last()) {
-        Some(((control, _), (pwm, _))) => format!("greatest: {control} (left), {pwm} (right)"),
-        None => String::new(),
-    }
 }
 
 /// The histograms of one task on common axes.
@@ -70,7 +64,7 @@ fn column(area: &Area, name: &str, rows: &[Row]) -> anyhow::Result<()> {
 }
 
 /// The histogram in bins of the given width: bars around the values, and their counts.
-fn bars(histogram: &Histogram, width: f64) -> Vec<Bar> {
+fn bars(histogram: &[(u32, u64)], width: f64) -> Vec<Bar> {
     let mut bars: Vec<Bar> = Vec::new();
     for &(value, count) in histogram {
         let left = (f64::from(value) / width).floor() * width - 0.5;

@@ -75,12 +75,17 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
             .into(),
         svg: one_step_defect::draw(input.runs)?,
     });
+    let runs = input.runs.iter();
+    let runs = runs.map(|run| (run.title.as_str(), &run.instructions));
+    let drives = input.drives.iter();
+    let drives = drives.map(|driven| (driven.title.as_str(), &driven.instructions));
+    let rows: Vec<_> = runs.chain(drives).collect();
     figures.push(Figure {
         name: "instructions".into(),
         caption: "How often the control task, and the slowest PWM task of each step, took how \
             many instructions."
             .into(),
-        svg: instructions::draw(input.runs)?,
+        svg: instructions::draw(&rows)?,
     });
     for driven in input.drives {
         figures.push(Figure {
@@ -152,7 +157,7 @@ mod tests {
         run.divergence = vec![(0.0, 0.0); 3];
         run.horizon_s = Some([f64::NAN, 1.0, 1e9]);
         run.dither_start_s = Some(1e9);
-        run.control_instructions = vec![(0, 0), (u32::MAX, u64::MAX)];
+        run.instructions.control = vec![(0, 0), (u32::MAX, u64::MAX)];
         assert_eq!(figures_of(run).len(), 6);
     }
 

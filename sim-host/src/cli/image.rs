@@ -1,0 +1,94 @@
+//! `sim-host image`: what a firmware image needs of its board, and how deep its stack can get.
+
+use super::Done;
+use super::output::Output;
+use serde::Serialize;
+use sim_host::image::stack::{Level, Stack};
+use sim_host::pil::elf::Image;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Show an image's size and its worst stack with the calls that lead there, read from the machine code.
+///
+/// The image has to be compiled with `-Zemit-stack-sizes`, as `cargo xtask proofs` does. The stack's figure is a bound:
+/// main program, control task, PWM interrupt, hard fault and watchdog each at their deepest, one on top of the other.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  cargo xtask proofs
+  sim-host image target/stack-sizes/thumbv7em-none-eabihf/firmware/ecu --json stack.json
+
+Exit code 1 if there is no bound (recursion, unknown frames), or less RAM than it takes.")]
+pub struct Arguments {
+    /// Firmware image (ELF)
+    image: PathBuf,
+    /// Write all figures as JSON
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Overwrite the file if it exists
+    #[arg(long)]
+    force: bool,
+}
+
+#[derive(Serialize)]
+struct Results<'a> {
+    compiler: &'a str,
+    flash_bytes: u64,
+    ram_bytes: u64,
+    stack: &'a Stack,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let image = Image::open(&arguments.image)?;
+    let stack = Stack::analyse(&image.bytes)?;
+    show(&image, &stack);
+    if let Some(path) = &arguments.json {
+        let results = Results {
+            compiler: &image.compiler,
+            flash_bytes: image.flash_bytes,
+            ram_bytes: image.ram_bytes,
+            stack: &stack,
+        };
+        let mut output = Output::create(path, arguments.force)?;
+        writeln!(
+            output.writer(),
+            "{}",
+            serde_json::to_string_pretty(&results)?
+        )?;
+        output.finish()?;
+    }
+    Ok(if stack.fits() {
+        Done::Well
+    } else {
+        Done::Failed
+    })
+}
+
+fn show(image: &Image, stack: &Stack) {
+    println!("built by {}", image.compiler);
+    println!(
+        "{} bytes of flash, {} bytes of RAM without stack",
+        image.flash_bytes, image.ram_bytes
+    );
+    println!(
+        "worst stack {} of {} bytes: {} between the levels, and",
+        stack.worst_bytes, stack.room_bytes, stack.exception_frames_bytes
+    );
+    for Level { name, bytes, path } in &stack.levels {
+        println!("  {bytes:6}  {name}");
+        for (function, frame) in path {
+            println!("          {frame:6}  {function}");
+        }
+    }
+    println!(
+        "frames: {} stated by the compiler, {} of them confirmed by their instructions; {} counted from the instructions alone",
+        stack.stated_functions, stack.confirmed_functions, stack.counted_functions
+    );
+    println!(
+        "calls through pointers, to any of {} functions: {}",
+        stack.address_taken,
+        stack.indirect_callers.join(", ")
+    );
+    for problem in &stack.problems {
+        println!("no bound: {problem}");
+    }
+}

@@ -1,0 +1,317 @@
+//! How deep the stack can get at worst.
+//!
+//! All code shares one stack. The main program may be interrupted at its deepest by the control task, that by the PWM
+//! interrupt, that by a hard fault, and that by the watchdog: each lower level at its deepest, with the registers that the
+//! core saves in between. The sum over these levels bounds the stack from above.
+//!
+//! Limits of the method:
+//! * The frame of a function is what the compiler states (`-Zemit-stack-sizes`), or the sum of what its instructions take,
+//!   if that is more. A function that the compiler states nothing of (assembly, the compiler's own arithmetic) has that sum.
+//! * A path through the call graph need not be one that a run can take, and a tail call keeps its caller's frame: the
+//!   bound may be too high.
+//! * A call through a pointer is taken to reach the deepest of all functions whose address is somewhere in the image.
+//!   Addresses that are computed by arithmetic would be missed; neither the compiler nor this project makes any.
+//! * Recursion, and code whose use of the stack nobody states, have no bound: they are problems, and the proof fails.
+//! * Levels are exceptions of different priority, as the firmware sets them. That an exception does not interrupt one of
+//!   its own level is the core's property, that the priorities are as here is the firmware's (`firmware/src/app.rs`).
+
+use super::AnalysisError;
+use super::call_graph::{CallGraph, Function};
+use super::memory::address_of;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// What the core saves for an exception where the floating-point unit is in use: 8 core registers, 16 of its own, status and a
+/// gap, also when saving is put off until they are used (Arm DDI 0403, B1.5.7).
+const EXCEPTION_FRAME_BYTES: u32 = 4 * (8 + 18);
+/// What it may add to align the stack pointer to 8 bytes.
+const ALIGNMENT_BYTES: u32 = 4;
+
+/// Levels by rising priority: name, and the functions that begin there. Of several the deepest counts.
+const LEVELS: [(&str, &[&str]); 5] = [
+    ("main program", &["Reset"]),
+    ("control task", &["PendSV"]),
+    ("PWM interrupt", &["SysTick", "DefaultHandler"]),
+    ("hard fault", &["HardFault"]),
+    ("watchdog", &["NonMaskableInt"]),
+];
+
+/// The worst stack of one level.
+#[derive(Debug, Clone, Serialize)]
+pub struct Level {
+    /// What runs there.
+    pub name: &'static str,
+    /// Bytes at worst, without what the core saves.
+    pub bytes: u32,
+    /// The calls that lead there: function and its frame, bytes.
+    pub path: Vec<(String, u32)>,
+}
+
+/// The worst stack of an image.
+#[derive(Debug, Clone, Serialize)]
+pub struct Stack {
+    /// Worst of each level, by rising priority.
+    pub levels: Vec<Level>,
+    /// What the core saves between them, bytes.
+    pub exception_frames_bytes: u32,
+    /// Sum of both, bytes.
+    pub worst_bytes: u32,
+    /// RAM between the static variables and the top of the stack, bytes.
+    pub room_bytes: u32,
+    /// Functions with the compiler's figure, and those of them whose instructions take exactly that.
+    pub stated_functions: usize,
+    /// See there.
+    pub confirmed_functions: usize,
+    /// Functions without one; their frame is counted from their instructions.
+    pub counted_functions: usize,
+    /// Functions that call through pointers.
+    pub indirect_callers: Vec<String>,
+    /// Functions that a pointer may point to.
+    pub address_taken: usize,
+    /// Why the figure is no bound; a proof has none.
+    pub problems: Vec<String>,
+}
+
+impl Stack {
+    /// Analyses an image.
+    ///
+    /// # Errors
+    /// If it is damaged, was compiled without the functions' frames, or lacks a symbol that every image of the firmware has.
+    pub fn analyse(bytes: &[u8]) -> Result<Self, AnalysisError> {
+        let file = object::File::parse(bytes)?;
+        let room = address_of(&file, "_stack_start")?.saturating_sub(address_of(&file, "__sheap")?);
+        Self::of(&CallGraph::read(bytes)?, &LEVELS, room as u32)
+    }
+
+    /// Whether the figure is a bound, and there is RAM for it.
+    pub fn fits(&self) -> bool {
+        self.problems.is_empty() && self.worst_bytes <= self.room_bytes
+    }
+
+    fn of(
+        graph: &CallGraph,
+        levels: &[(&'static str, &'static [&'static str])],
+        room_bytes: u32,
+    ) -> Result<Self, AnalysisError> {
+        let mut search = Search::new(graph);
+        let mut found = Vec::new();
+        for &(name, entries) in levels {
+            found.push(search.level(name, entries)?);
+        }
+        let preemptions = levels.len() as u32 - 1;
+        let exception_frames_bytes = preemptions * (EXCEPTION_FRAME_BYTES + ALIGNMENT_BYTES);
+        let functions = || graph.functions.values();
+        let stated = || functions().filter(|function| function.stated_bytes.is_some());
+        let indirect = functions().filter(|function| function.indirect_calls > 0);
+        Ok(Self {
+            worst_bytes: found.iter().map(|level| level.bytes).sum::<u32>()
+                + exception_frames_bytes,
+            levels: found,
+            exception_frames_bytes,
+            room_bytes,
+            stated_functions: stated().count(),
+            confirmed_functions: stated().filter(|function| is_confirmed(function)).count(),
+            counted_functions: functions().count() - stated().count(),
+            indirect_callers: indirect
+                .map(|function| function.name().to_owned())
+                .collect(),
+            address_taken: graph.address_taken.len(),
+            problems: search.problems,
+        })
+    }
+}
+
+fn is_confirmed(function: &Function) -> bool {
+    function.stated_bytes == Some(function.counted_bytes)
+}
+
+/// The deepest path below a function.
+#[derive(Debug, Clone, Copy)]
+struct Deepest {
+    bytes: u32,
+    next: Option<u32>,
+}
+
+struct Search<'a> {
+    graph: &'a CallGraph,
+    /// What is known; `None` while a function is being looked at.
+    known: BTreeMap<u32, Option<Deepest>>,
+    problems: Vec<String>,
+}
+
+impl<'a> Search<'a> {
+    fn new(graph: &'a CallGraph) -> Self {
+        Self {
+            graph,
+            known: BTreeMap::new(),
+            problems: Vec::new(),
+        }
+    }
+
+    fn level(
+        &mut self,
+        name: &'static str,
+        entries: &[&'static str],
+    ) -> Result<Level, AnalysisError> {
+        let mut deepest: Option<(u32, u32)> = None;
+        for &entry in entries {
+            let function = self
+                .graph
+                .find(entry)
+                .ok_or(AnalysisError::NoSymbol(entry))?;
+            let bytes = self.deepest(function);
+            if deepest.is_none_or(|(most, _)| bytes > most) {
+                deepest = Some((bytes, function));
+            }
+        }
+        let (bytes, entry) = deepest.unwrap_or_default();
+        Ok(Level {
+            name,
+            bytes,
+            path: self.path(entry),
+        })
+    }
+
+    /// Bytes of stack below the function's caller.
+    fn deepest(&mut self, address: u32) -> u32 {
+        let Some(function) = self.graph.functions.get(&address) else {
+            return 0;
+        };
+        match self.known.get(&address) {
+            Some(Some(known)) => return known.bytes,
+            Some(None) => {
+                self.problems
+                    .push(format!("{} calls itself", function.name()));
+                return 0;
+            }
+            None => {}
+        }
+        self.known.insert(address, None);
+        for stray in &function.strays {
+            let problem = format!("{} goes to {stray:#x}, no function", function.name());
+            self.problems.push(problem);
+        }
+        let own = function.frame_bytes().unwrap_or_else(|| {
+            let problem = format!("{} sets the stack pointer itself", function.name());
+            self.problems.push(problem);
+            0
+        });
+        let pointers = (function.indirect_calls > 0).then_some(&self.graph.address_taken);
+        let mut deepest = Deepest {
+            bytes: own,
+            next: None,
+        };
+        for &called in function.calls.iter().chain(pointers.into_iter().flatten()) {
+            let bytes = own + self.deepest(called);
+            if bytes > deepest.bytes {
+                deepest = Deepest {
+                    bytes,
+                    next: Some(called),
+                };
+            }
+        }
+        self.known.insert(address, Some(deepest));
+        deepest.bytes
+    }
+
+    fn path(&self, entry: u32) -> Vec<(String, u32)> {
+        let mut path = Vec::new();
+        let mut at = Some(entry);
+        while let Some((function, address)) =
+            at.and_then(|at| Some((self.graph.functions.get(&at)?, at)))
+        {
+            path.push((
+                function.name().to_owned(),
+                function.frame_bytes().unwrap_or(0),
+            ));
+            at = self
+                .known
+                .get(&address)
+                .copied()
+                .flatten()
+                .and_then(|deepest| deepest.next);
+        }
+        path
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Functions by address: frame, calls, calls through pointers.
+    fn graph(functions: &[(u32, u32, &[u32], u32)], address_taken: &[u32]) -> CallGraph {
+        let function = |&(address, bytes, calls, indirect_calls): &(u32, u32, &[u32], u32)| {
+            let function = Function {
+                names: [format!("f{address}")].into(),
+                stated_bytes: Some(bytes),
+                calls: calls.iter().copied().collect(),
+                indirect_calls,
+                ..Function::default()
+            };
+            (address, function)
+        };
+        CallGraph {
+            functions: functions.iter().map(function).collect(),
+            address_taken: address_taken.iter().copied().collect(),
+        }
+    }
+
+    fn worst(graph: &CallGraph) -> Stack {
+        Stack::of(graph, &[("main program", &["f0"]), ("task", &["f8"])], 4096).unwrap()
+    }
+
+    #[test]
+    fn the_deepest_paths_add_up_with_the_core_s_frames() {
+        let graph = graph(
+            &[
+                (0, 8, &[2, 4], 0),
+                (2, 100, &[], 0),
+                (4, 16, &[6], 0),
+                (6, 90, &[], 0),
+                (8, 24, &[6], 0),
+            ],
+            &[],
+        );
+        let stack = worst(&graph);
+        assert_eq!(stack.problems, [] as [&str; 0]);
+        assert_eq!(stack.worst_bytes, (8 + 16 + 90) + (24 + 90) + 108);
+        assert_eq!(
+            stack.levels[0].path,
+            [("f0".into(), 8), ("f4".into(), 16), ("f6".into(), 90)]
+        );
+    }
+
+    #[test]
+    fn a_pointer_reaches_the_deepest_function_that_has_an_address() {
+        let functions: &[(u32, u32, &[u32], u32)] = &[
+            (0, 8, &[], 1),
+            (2, 100, &[], 0),
+            (4, 200, &[], 0),
+            (8, 0, &[], 0),
+        ];
+        assert_eq!(worst(&graph(functions, &[2])).levels[0].bytes, 108);
+        assert_eq!(worst(&graph(functions, &[2, 4])).levels[0].bytes, 208);
+    }
+
+    #[test]
+    fn recursion_has_no_bound() {
+        let functions: &[(u32, u32, &[u32], u32)] = &[
+            (0, 8, &[2], 0),
+            (2, 8, &[4], 0),
+            (4, 8, &[2], 0),
+            (8, 8, &[], 0),
+        ];
+        assert_eq!(worst(&graph(functions, &[])).problems, ["f2 calls itself"]);
+    }
+
+    #[test]
+    fn unknown_frames_and_strays_are_problems() {
+        let mut graph = graph(&[(0, 8, &[2], 0), (2, 8, &[], 0), (8, 8, &[], 0)], &[]);
+        let function = graph.functions.get_mut(&2).unwrap();
+        function.stated_bytes = None;
+        function.sets_stack_pointer = true;
+        function.strays = vec![0x100];
+        assert_eq!(worst(&graph).problems.len(), 2);
+    }
+}

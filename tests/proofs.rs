@@ -1,0 +1,288 @@
+//! What is shown of the firmware's images: worst stack, size, instructions of the tasks, spacing of interrupts.
+
+use shared_model::Scenario;
+use shared_model::dither::{Application, Waveform};
+use shared_model::friction::FrictionLaw;
+use shared_model::tire::TireModel;
+use shared_model::vehicle::SlipForm;
+use sim_host::closed_loop::drive::{Drive, ecu_scenario};
+use sim_host::closed_loop::levels::{Target, on_processor};
+use sim_host::closed_loop::manoeuvre::{self, Manoeuvre};
+use sim_host::image::memory::Map;
+use sim_host::image::stack::Stack;
+use sim_host::instructions::{Instructions, median, most};
+use sim_host::pil::elf::Image;
+use sim_host::pil::qemu::Machine;
+use sim_host::pil::session::LinkKind;
+use std::fs;
+use tests::golden::{Figure, check_figures};
+use tests::{TIME_OUT, board_image, framed_image, image, record, root};
+
+const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
+/// What the ECU's program may take of any board, bytes: limits of this project, far below what the boards have.
+const STACK_LIMIT_BYTES: u32 = 16 * 1024;
+const FLASH_LIMIT_BYTES: u32 = 128 * 1024;
+const RAM_LIMIT_BYTES: u32 = 64 * 1024;
+/// Spread of the time between PWM interrupts, counts of 40 ns.
+const JITTER_LIMIT_COUNTS: u32 = 25;
+
+fn memory_map(board: &str) -> Map {
+    let path = root()
+        .join("firmware/src/board")
+        .join(board)
+        .join("memory.x");
+    let text = fs::read_to_string(&path).expect("every board has a memory map");
+    Map::parse(&text).unwrap_or_else(|error| panic!("{board}: {error}"))
+}
+
+fn proven_stack(board: &str, framed: &Image) -> Stack {
+    let stack = Stack::analyse(&framed.bytes).unwrap_or_else(|error| panic!("{board}: {error}"));
+    assert_eq!(
+        stack.problems,
+        [] as [&str; 0],
+        "{board}: there is no bound"
+    );
+    assert!(
+        stack.fits(),
+        "{board}: {} of {} bytes",
+        stack.worst_bytes,
+        stack.room_bytes
+    );
+    stack
+}
+
+#[test]
+fn worst_stack() {
+    let mut figures = Vec::new();
+    let mut compiler = String::new();
+    for board in BOARDS {
+        let framed = framed_image(board);
+        let stack = proven_stack(board, &framed);
+        // Two independent sources: what the compiler states, and what the instructions take.
+        assert!(
+            10 * stack.confirmed_functions >= 9 * stack.stated_functions,
+            "{board}: {} of {} frames confirmed",
+            stack.confirmed_functions,
+            stack.stated_functions
+        );
+        for level in &stack.levels {
+            let name = format!("{board}/{}", level.name.replace(' ', "-"));
+            figures.push(Figure::new(name, level.bytes, "bytes"));
+        }
+        let saved = stack.exception_frames_bytes;
+        figures.push(Figure::new(
+            format!("{board}/saved-by-the-core"),
+            saved,
+            "bytes",
+        ));
+        let worst = Figure::new(format!("{board}/worst"), stack.worst_bytes, "bytes");
+        figures.push(worst.at_most(STACK_LIMIT_BYTES));
+        figures.push(Figure::new(
+            format!("{board}/room"),
+            stack.room_bytes,
+            "bytes",
+        ));
+        compiler = framed.compiler;
+    }
+    let about = "Worst stack of the ECU on each board: levels that interrupt each other, their sum, and the RAM for it.";
+    check_figures("stack.txt", about, &compiler, &figures);
+}
+
+/// The image whose stack is analysed has the code of the one that runs.
+#[test]
+fn the_analysed_image_is_the_one_that_runs() {
+    for board in BOARDS {
+        let (framed, runs) = (framed_image(board), board_image(board, "ecu"));
+        assert_eq!(
+            (framed.flash_bytes, framed.ram_bytes),
+            (runs.flash_bytes, runs.ram_bytes),
+            "{board}: run `cargo xtask proofs`"
+        );
+    }
+}
+
+/// Nothing that was ever measured is deeper than the bound, and the bound is not from another world.
+#[test]
+fn no_run_is_deeper_than_the_bound() {
+    let bound = proven_stack("mps2", &framed_image("mps2")).worst_bytes;
+    let mut scenarios = Vec::new();
+    for waveform in [Waveform::None, Waveform::Square, Waveform::Sine] {
+        scenarios.push(scenario(waveform, Application::Averaged));
+        scenarios.push(scenario(waveform, Application::Signal));
+    }
+    // The program's deepest paths: every alternative of the model that calls more.
+    let mut largest = scenario(Waveform::Sine, Application::Averaged);
+    largest.friction.law = FrictionLaw::PrintedAngle;
+    largest.tires.model = TireModel::MagicFormula;
+    largest.vehicle.slip_form = SlipForm::Exact;
+    largest.run.control_rate_hz = 20.0;
+    scenarios.push(largest);
+    let depths = scenarios
+        .iter()
+        .map(|scenario| record(scenario, Machine::Mps2An386, 0).trailer.stack_bytes);
+    let deepest = depths.max().unwrap_or(0);
+    println!("deepest measured {deepest} of at most {bound} bytes");
+    assert!(deepest <= bound, "{deepest} bytes measured, bound {bound}");
+    assert!(
+        4 * deepest >= bound,
+        "{deepest} bytes measured, bound {bound}"
+    );
+}
+
+#[test]
+fn flash_and_ram() {
+    let mut figures = Vec::new();
+    let mut compiler = String::new();
+    for board in BOARDS {
+        let map = memory_map(board);
+        let image = board_image(board, "ecu");
+        assert!(image.flash_bytes <= map.flash_bytes, "{board}: flash");
+        assert!(image.ram_bytes <= map.ram_bytes, "{board}: RAM");
+        for (what, bytes, limit, there) in [
+            (
+                "flash",
+                image.flash_bytes,
+                FLASH_LIMIT_BYTES,
+                map.flash_bytes,
+            ),
+            ("ram", image.ram_bytes, RAM_LIMIT_BYTES, map.ram_bytes),
+        ] {
+            let taken = Figure::new(format!("{board}/{what}"), bytes as u32, "bytes");
+            figures.push(taken.at_most(limit));
+            figures.push(Figure::new(
+                format!("{board}/{what}-there-is"),
+                there as u32,
+                "bytes",
+            ));
+        }
+        compiler = image.compiler;
+    }
+    let about =
+        "Flash and RAM (without stack) that the ECU takes of each board, and what the board has.";
+    check_figures("sizes.txt", about, &compiler, &figures);
+}
+
+/// Beside the link that proves it: the image holds no code that panics.
+#[test]
+fn no_panic_is_in_the_panic_free_image() {
+    for board in BOARDS {
+        let functions = function_names(&board_image(board, "panic-free"));
+        assert!(
+            functions.iter().any(|name| name == "SysTick"),
+            "{board}: {functions:?}"
+        );
+        let panics: Vec<_> = functions
+            .iter()
+            .filter(|name| name.contains("panic"))
+            .collect();
+        assert_eq!(panics, [] as [&str; 0], "{board}");
+        let others = function_names(&board_image(board, "ecu"));
+        assert!(
+            others.iter().any(|name| name.contains("panic")),
+            "the ECU's image has a handler at least"
+        );
+    }
+}
+
+fn function_names(image: &Image) -> Vec<String> {
+    sim_host::image::function_names(&image.bytes).expect("the image can be read")
+}
+
+fn scenario(waveform: Waveform, application: Application) -> Scenario<f32> {
+    let mut scenario = Scenario::reconstruction();
+    scenario.run.duration_s = 2.0;
+    scenario.dither.start_time_s = 0.5;
+    scenario.dither.waveform = waveform;
+    scenario.dither.application = application;
+    scenario.dither.amplitude_v = match waveform {
+        Waveform::None => 0.0,
+        Waveform::Square => 0.1,
+        Waveform::Sine => 1.0,
+    };
+    scenario
+}
+
+fn instruction_figures(run: &str, instructions: &Instructions) -> Vec<Figure> {
+    let figure = |what: &str, value: u32| Figure::new(format!("{run}/{what}"), value, "instr");
+    let percent = (1000.0 * instructions.worst_share()).round() / 10.0;
+    vec![
+        figure("control-median", median(&instructions.control)),
+        figure("control-most", most(&instructions.control)),
+        figure("pwm-median", median(&instructions.pwm)),
+        figure("pwm-most", most(&instructions.pwm)),
+        Figure::new(format!("{run}/worst-share"), percent, "%").at_most(100.0),
+    ]
+}
+
+fn drive() -> Instructions {
+    let file = root().join("examples/manoeuvres/constant-speed.toml");
+    let (mut scenario, manoeuvre): (_, Manoeuvre) =
+        manoeuvre::load(&file).unwrap_or_else(|error| panic!("{error}"));
+    scenario.run.duration_s = 5.0;
+    let target = Target {
+        image: image("ecu"),
+        machine: Machine::Mps2An386,
+        link: LinkKind::Files,
+        time_out: TIME_OUT,
+    };
+    let drive = Drive::new(&scenario, &manoeuvre).expect("the example is valid");
+    let ecu = ecu_scenario(&scenario, &manoeuvre);
+    let run = on_processor(&ecu, drive, &target, || {}).unwrap_or_else(|error| panic!("{error}"));
+    Instructions::in_loop(&run.costs, &scenario, target.machine)
+}
+
+#[test]
+fn instructions_per_tick() {
+    let mut figures = Vec::new();
+    for (name, waveform, application) in [
+        ("open-loop/none", Waveform::None, Application::Averaged),
+        ("open-loop/square", Waveform::Square, Application::Averaged),
+        ("open-loop/sine", Waveform::Sine, Application::Averaged),
+        (
+            "open-loop/square-signal",
+            Waveform::Square,
+            Application::Signal,
+        ),
+        ("open-loop/sine-signal", Waveform::Sine, Application::Signal),
+    ] {
+        let recording = record(&scenario(waveform, application), Machine::Mps2An386, 0);
+        figures.extend(instruction_figures(name, &Instructions::of(&recording)));
+    }
+    figures.extend(instruction_figures("in-loop/square", &drive()));
+    let about = "Instructions (no cycles) of the tasks on the board mps2: median and most of the control task and of the slowest PWM\n\
+                 task of a tick, and the share of a tick that both take at worst. The dither sets in on the way.";
+    check_figures("instructions.txt", about, &image("ecu").compiler, &figures);
+}
+
+/// PWM interrupts, at least, at each rate.
+const INTERRUPTS: f32 = 1e5;
+
+#[test]
+fn spacing_of_interrupts() {
+    let mut figures = Vec::new();
+    for pwm_rate_hz in [10_000.0, 20_000.0, 50_000.0_f32] {
+        let mut scenario = scenario(Waveform::Sine, Application::Averaged);
+        scenario.run.pwm_rate_hz = pwm_rate_hz;
+        scenario.run.duration_s = INTERRUPTS / pwm_rate_hz + 0.5;
+        let recording = record(&scenario, Machine::Mps2An386, 0);
+        assert!(recording.duties.len() as f32 >= INTERRUPTS);
+        let (least, most) = (
+            recording.trailer.least_spacing,
+            recording.trailer.most_spacing,
+        );
+        let nominal = f32::from(recording.header.pwm_period);
+        assert!(
+            f32::from(least) <= nominal && nominal <= f32::from(most),
+            "{least} to {most}"
+        );
+        let name = |what: &str| format!("{pwm_rate_hz}-Hz/{what}");
+        figures.push(Figure::new(name("nominal"), nominal, "counts"));
+        figures.push(Figure::new(name("least"), least, "counts"));
+        figures.push(Figure::new(name("most"), most, "counts"));
+        let spread = Figure::new(name("spread"), most - least, "counts");
+        figures.push(spread.at_most(JITTER_LIMIT_COUNTS));
+    }
+    let about = "Counts of 40 ns of an independent timer between PWM interrupts, over 100,000 of them at each rate, while the control task\n\
+                 works; in the emulator's time, in which an instruction takes 32 ns. That is no measurement of silicon.";
+    check_figures("jitter.txt", about, &image("ecu").compiler, &figures);
+}
