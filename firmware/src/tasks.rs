@@ -21,10 +21,11 @@ static FOREIGN_COST: AtomicU32 = AtomicU32::new(0);
 static SAMPLES: AtomicU32 = AtomicU32::new(0);
 static SAMPLES_A_MS: AtomicU32 = AtomicU32::new(1);
 
-static PWM_START: Mutex<Cell<Option<&mut PwmInterrupt>>> = Mutex::new(Cell::new(None));
-static CONTROL_START: Mutex<Cell<Option<&mut ControlInterrupt>>> = Mutex::new(Cell::new(None));
+static PWM_START: Mutex<Cell<Option<PwmInterrupt>>> = Mutex::new(Cell::new(None));
+static CONTROL_START: Mutex<Cell<Option<ControlInterrupt>>> = Mutex::new(Cell::new(None));
 
-/// What the PWM interrupt works on. By reference: the interrupts' stacks have no room for moving it.
+/// What the PWM interrupt works on. By reference: an interrupt that moves a whole task needs the stack for it,
+/// and holds up the other for most of a fast PWM's period.
 pub enum PwmInterrupt {
     /// The vehicle model runs on the ECU.
     OpenLoop(&'static mut open_loop::PwmInterrupt),
@@ -43,12 +44,9 @@ pub enum ControlInterrupt {
 /// Hands the tasks to their interrupts, which take them at their first call.
 pub fn hand_over(pwm: PwmInterrupt, control: ControlInterrupt, samples_a_ms: u32) {
     SAMPLES_A_MS.store(samples_a_ms.max(1), Ordering::Relaxed);
-    // The interrupts take references: to move a whole task, they would switch each other off for most of a fast PWM's period.
-    let pwm = cortex_m::singleton!(: PwmInterrupt = pwm);
-    let control = cortex_m::singleton!(: ControlInterrupt = control);
     critical_section::with(|cs| {
-        PWM_START.borrow(cs).set(pwm);
-        CONTROL_START.borrow(cs).set(control);
+        PWM_START.borrow(cs).set(Some(pwm));
+        CONTROL_START.borrow(cs).set(Some(control));
     });
 }
 
@@ -96,7 +94,7 @@ pub fn saturate(counts: u32) -> u16 {
 
 #[exception]
 fn SysTick() {
-    static mut INTERRUPT: Option<&'static mut PwmInterrupt> = None;
+    static mut INTERRUPT: Option<PwmInterrupt> = None;
     let start = Current::cost_counter();
     if INTERRUPT.is_some() {
         spacing::note(start);
@@ -105,7 +103,7 @@ fn SysTick() {
         spacing::begin(start);
     }
     SAMPLES.fetch_add(1, Ordering::Relaxed);
-    match INTERRUPT.as_deref_mut() {
+    match INTERRUPT {
         Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),
         None => {}
@@ -117,11 +115,11 @@ fn SysTick() {
 
 #[exception]
 fn PendSV() {
-    static mut INTERRUPT: Option<&'static mut ControlInterrupt> = None;
+    static mut INTERRUPT: Option<ControlInterrupt> = None;
     if INTERRUPT.is_none() {
         *INTERRUPT = critical_section::with(|cs| CONTROL_START.borrow(cs).take());
     }
-    match INTERRUPT.as_deref_mut() {
+    match INTERRUPT {
         Some(ControlInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(ControlInterrupt::InLoop(interrupt)) => interrupt.run(),
         None => {}
