@@ -193,6 +193,23 @@ fn motor_slew_holds_in_the_first_tick_and_across_lost_frames() {
     assert_only(&later, Fault::MotorSlew);
 }
 
+/// The last numbers that pass, rounding included, and the first that do not.
+#[test]
+fn motor_limits_end_at_a_number() {
+    let most_v = MOTOR_LIMIT_V * (1.0 + 1e-6);
+    for (motor_v, is_fault) in [(most_v, false), (most_v.next_up(), true)] {
+        let mut at = active_at(Waveform::Square, MOTOR_LIMIT_V);
+        at.run(&command(motor_v, 0.0));
+        assert_eq!(at.faults().contains(Fault::MotorVoltage), is_fault);
+    }
+    let most_change_v = 4.0 * (1.0 / 1000.0) + 1e-6 * MOTOR_LIMIT_V;
+    for (motor_v, is_fault) in [(most_change_v, false), (most_change_v.next_up(), true)] {
+        let mut at = supervisor(Waveform::Square);
+        at.run(&command(motor_v, 0.0));
+        assert_eq!(at.faults().contains(Fault::MotorSlew), is_fault);
+    }
+}
+
 /// What the limit lets through exactly, a controller at that limit must be able to command for ever.
 #[test]
 fn a_controller_at_the_limits_raises_no_alarm() {

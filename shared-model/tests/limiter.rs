@@ -221,7 +221,7 @@ fn dither_that_was_off_begins_anew() {
 #[test]
 fn dither_that_does_not_swing_is_found() {
     let unsure = 0.1 * OSCILLATOR_SINE_ERROR as f32;
-    for constant in [0.1, -0.1, 0.0, 0.99 * unsure, unsure] {
+    for constant in [0.1, -0.1, 0.0, 0.99 * unsure, unsure, -unsure] {
         let mut limiter = limiter();
         for sample in 0..21 {
             let sign = if constant.abs() < 1e-3 && sample % 2 == 0 {

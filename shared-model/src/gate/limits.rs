@@ -122,83 +122,152 @@ impl<T: Real> Limits<T> {
     }
 }
 
-/// A limit's name, range and place.
-const fn limit<T>(
-    name: &'static str,
-    min: f64,
-    max: f64,
-    place: fn(&mut Limits<T>) -> &mut T,
-) -> Field<Limits<T>, T> {
-    Field {
-        name,
-        min,
-        max,
-        place,
-    }
-}
-
 impl<T: Real> ParameterSet<T> for Limits<T> {
     const SECTION: &'static str = "gate";
     const FIELDS: &'static [Field<Self, T>] = &[
-        limit("motor_voltage_v", 0.0, 1000.0, |p| &mut p.motor_voltage_v),
-        limit("motor_slew_v_per_s", 1e-3, 1e6, |p| {
-            &mut p.motor_slew_v_per_s
-        }),
-        limit("square_amplitude_v", 0.0, 1000.0, |p| {
-            &mut p.square_amplitude_v
-        }),
-        limit("sine_amplitude_v", 0.0, 1000.0, |p| &mut p.sine_amplitude_v),
-        limit("dither_frequency_min_rad_per_s", 1.0, 1e6, |p| {
-            &mut p.dither_frequency_min_rad_per_s
-        }),
-        limit("dither_frequency_max_rad_per_s", 1.0, 1e6, |p| {
-            &mut p.dither_frequency_max_rad_per_s
-        }),
-        limit("ramp_out_s", 1e-3, 10.0, |p| &mut p.ramp_out_s),
-        limit("safe_wheel_speed_rpm", 0.0, 1e5, |p| {
-            &mut p.safe_wheel_speed_rpm
-        }),
-        limit("wheel_speed_rpm", 1.0, 1e5, |p| &mut p.wheel_speed_rpm),
-        limit("wheel_acceleration_rpm_per_s", 1.0, 1e6, |p| {
-            &mut p.wheel_acceleration_rpm_per_s
-        }),
-        limit("yaw_rate_rad_per_s", 1e-3, 100.0, |p| {
-            &mut p.yaw_rate_rad_per_s
-        }),
-        limit("yaw_acceleration_rad_per_s2", 1e-3, 1e5, |p| {
-            &mut p.yaw_acceleration_rad_per_s2
-        }),
-        limit("steering_angle_rad", 1e-3, 10.0, |p| {
-            &mut p.steering_angle_rad
-        }),
-        limit("steering_angle_change_rad_per_s", 1e-3, 1e5, |p| {
-            &mut p.steering_angle_change_rad_per_s
-        }),
-        limit("steering_rate_rad_per_s", 1e-3, 1000.0, |p| {
-            &mut p.steering_rate_rad_per_s
-        }),
-        limit("steering_acceleration_rad_per_s2", 1e-3, 1e6, |p| {
-            &mut p.steering_acceleration_rad_per_s2
-        }),
-        limit("current_request_a", 0.0, 1000.0, |p| {
-            &mut p.current_request_a
-        }),
-        limit("lateral_acceleration_m_per_s2", 0.1, 1000.0, |p| {
-            &mut p.lateral_acceleration_m_per_s2
-        }),
-        limit("steering_contradiction_rad", 1e-4, 10.0, |p| {
-            &mut p.steering_contradiction_rad
-        }),
-        limit("steering_memory_s", 1e-2, 10.0, |p| {
-            &mut p.steering_memory_s
-        }),
-        limit("stuck_steering_rad", 1e-3, 10.0, |p| {
-            &mut p.stuck_steering_rad
-        }),
-        limit("stuck_wheel_speed_rpm", 0.0, 1e5, |p| {
-            &mut p.stuck_wheel_speed_rpm
-        }),
-        limit("frame_age_s", 1e-3, 1.0, |p| &mut p.frame_age_s),
-        limit("tick_tolerance", 0.01, 1.0, |p| &mut p.tick_tolerance),
+        Field {
+            name: "motor_voltage_v",
+            min: 0.0,
+            max: 1000.0,
+            place: |p| &mut p.motor_voltage_v,
+        },
+        Field {
+            name: "motor_slew_v_per_s",
+            min: 1e-3,
+            max: 1e6,
+            place: |p| &mut p.motor_slew_v_per_s,
+        },
+        Field {
+            name: "square_amplitude_v",
+            min: 0.0,
+            max: 1000.0,
+            place: |p| &mut p.square_amplitude_v,
+        },
+        Field {
+            name: "sine_amplitude_v",
+            min: 0.0,
+            max: 1000.0,
+            place: |p| &mut p.sine_amplitude_v,
+        },
+        Field {
+            name: "dither_frequency_min_rad_per_s",
+            min: 1.0,
+            max: 1e6,
+            place: |p| &mut p.dither_frequency_min_rad_per_s,
+        },
+        Field {
+            name: "dither_frequency_max_rad_per_s",
+            min: 1.0,
+            max: 1e6,
+            place: |p| &mut p.dither_frequency_max_rad_per_s,
+        },
+        Field {
+            name: "ramp_out_s",
+            min: 1e-3,
+            max: 10.0,
+            place: |p| &mut p.ramp_out_s,
+        },
+        Field {
+            name: "safe_wheel_speed_rpm",
+            min: 0.0,
+            max: 1e5,
+            place: |p| &mut p.safe_wheel_speed_rpm,
+        },
+        Field {
+            name: "wheel_speed_rpm",
+            min: 1.0,
+            max: 1e5,
+            place: |p| &mut p.wheel_speed_rpm,
+        },
+        Field {
+            name: "wheel_acceleration_rpm_per_s",
+            min: 1.0,
+            max: 1e6,
+            place: |p| &mut p.wheel_acceleration_rpm_per_s,
+        },
+        Field {
+            name: "yaw_rate_rad_per_s",
+            min: 1e-3,
+            max: 100.0,
+            place: |p| &mut p.yaw_rate_rad_per_s,
+        },
+        Field {
+            name: "yaw_acceleration_rad_per_s2",
+            min: 1e-3,
+            max: 1e5,
+            place: |p| &mut p.yaw_acceleration_rad_per_s2,
+        },
+        Field {
+            name: "steering_angle_rad",
+            min: 1e-3,
+            max: 10.0,
+            place: |p| &mut p.steering_angle_rad,
+        },
+        Field {
+            name: "steering_angle_change_rad_per_s",
+            min: 1e-3,
+            max: 1e5,
+            place: |p| &mut p.steering_angle_change_rad_per_s,
+        },
+        Field {
+            name: "steering_rate_rad_per_s",
+            min: 1e-3,
+            max: 1000.0,
+            place: |p| &mut p.steering_rate_rad_per_s,
+        },
+        Field {
+            name: "steering_acceleration_rad_per_s2",
+            min: 1e-3,
+            max: 1e6,
+            place: |p| &mut p.steering_acceleration_rad_per_s2,
+        },
+        Field {
+            name: "current_request_a",
+            min: 0.0,
+            max: 1000.0,
+            place: |p| &mut p.current_request_a,
+        },
+        Field {
+            name: "lateral_acceleration_m_per_s2",
+            min: 0.1,
+            max: 1000.0,
+            place: |p| &mut p.lateral_acceleration_m_per_s2,
+        },
+        Field {
+            name: "steering_contradiction_rad",
+            min: 1e-4,
+            max: 10.0,
+            place: |p| &mut p.steering_contradiction_rad,
+        },
+        Field {
+            name: "steering_memory_s",
+            min: 1e-2,
+            max: 10.0,
+            place: |p| &mut p.steering_memory_s,
+        },
+        Field {
+            name: "stuck_steering_rad",
+            min: 1e-3,
+            max: 10.0,
+            place: |p| &mut p.stuck_steering_rad,
+        },
+        Field {
+            name: "stuck_wheel_speed_rpm",
+            min: 0.0,
+            max: 1e5,
+            place: |p| &mut p.stuck_wheel_speed_rpm,
+        },
+        Field {
+            name: "frame_age_s",
+            min: 1e-3,
+            max: 1.0,
+            place: |p| &mut p.frame_age_s,
+        },
+        Field {
+            name: "tick_tolerance",
+            min: 0.01,
+            max: 1.0,
+            place: |p| &mut p.tick_tolerance,
+        },
     ];
 }
