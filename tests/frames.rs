@@ -5,10 +5,12 @@ use autosar_e2e::profile5::{Profile5, Profile5Config};
 use autosar_e2e::{E2EProfile, E2EStatus};
 use fastrand::Rng;
 use shared_model::e2e::{Receiver, Sender, Status};
+use shared_model::ecu::Warning;
 use shared_model::exchange::{FRAME_LEN, FrameBytes};
 use shared_model::frame::{
     ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, encode_actuation, encode_measurement,
 };
+use shared_model::gate::Fault;
 use shared_model::signal::{Actuation, Measurement, Mode};
 use std::fs;
 use std::io::Write;
@@ -342,5 +344,16 @@ fn statuses_are_those_of_another_crate() {
     for status in [Ok, OkSomeLost, Error, Repeated, WrongSequence] {
         let count = seen.iter().filter(|&&seen| seen == status).count();
         assert!(count > 100, "{status:?} was compared {count} times");
+    }
+}
+
+#[test]
+fn the_dbc_names_every_bit_of_faults_and_warnings() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/dithersteer.dbc");
+    let text = std::fs::read_to_string(file).expect("the DBC file is there");
+    let faults = Fault::ALL.map(|fault| format!("{} {}", fault as u8, fault.name()));
+    let warnings = Warning::ALL.map(|warning| format!("{} {}", warning as u8, warning.name()));
+    for bits in [faults.join(", "), warnings.join(", ")] {
+        assert!(text.contains(&format!("one bit each: {bits}.\"")), "{bits}");
     }
 }

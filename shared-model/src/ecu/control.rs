@@ -27,6 +27,28 @@ pub enum Warning {
     FramesLost = 4,
 }
 
+impl Warning {
+    /// All warnings.
+    pub const ALL: [Self; 5] = [
+        Self::FrameMissing,
+        Self::FrameDamaged,
+        Self::FrameRepeated,
+        Self::FrameSequence,
+        Self::FramesLost,
+    ];
+
+    /// Its name, for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FrameMissing => "frame missing",
+            Self::FrameDamaged => "frame damaged",
+            Self::FrameRepeated => "frame repeated",
+            Self::FrameSequence => "frame sequence",
+            Self::FramesLost => "frames lost",
+        }
+    }
+}
+
 /// What a control tick works on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlInput {
