@@ -210,6 +210,15 @@ pub fn load(path: &Path) -> Result<(Scenario<f64>, Manoeuvre), ManoeuvreError> {
     parse(config::read(path)?)
 }
 
+/// Reads the text of a manoeuvre's file, as [`load`] does.
+///
+/// # Errors
+/// As [`load`].
+pub fn from_text(text: &str) -> Result<(Scenario<f64>, Manoeuvre), ManoeuvreError> {
+    let file = text.parse::<Table>();
+    parse(file.map_err(|error| ManoeuvreError::Table(Box::new(error)))?)
+}
+
 fn parse(mut file: Table) -> Result<(Scenario<f64>, Manoeuvre), ManoeuvreError> {
     let own = file.remove(TABLE).ok_or(ManoeuvreError::Missing)?;
     let manoeuvre: Manoeuvre = own
