@@ -38,11 +38,12 @@ pub fn guard() {
     let size = (GUARD_BYTES.trailing_zeros() - 1) << 1;
     // SAFETY: called before anything else could use the unit; no address of the region belongs to the program.
     unsafe {
-        let core = cortex_m::Peripherals::steal();
-        core.MPU.rnr.write(0);
-        core.MPU.rbar.write(bottom as u32 - GUARD_BYTES);
-        core.MPU.rasr.write(EXECUTE_NEVER | size | REGION_ON);
-        core.MPU.ctrl.write(USUAL_MAP | UNIT_ON);
+        // Not by the crate's own way to the peripherals, which then are taken, and the board could not have them.
+        let unit = &*cortex_m::peripheral::MPU::PTR;
+        unit.rnr.write(0);
+        unit.rbar.write(bottom as u32 - GUARD_BYTES);
+        unit.rasr.write(EXECUTE_NEVER | size | REGION_ON);
+        unit.ctrl.write(USUAL_MAP | UNIT_ON);
     }
     cortex_m::asm::dsb();
     cortex_m::asm::isb();

@@ -6,6 +6,7 @@ mod config;
 mod convergence;
 mod decode;
 mod equilibria;
+mod faults;
 mod lyapunov;
 mod nonlinearity;
 mod orbit;
@@ -69,6 +70,7 @@ enum Command {
     Nonlinearity(nonlinearity::Arguments),
     Schedule(schedule::Arguments),
     Realisability(realisability::Arguments),
+    Faults(faults::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
     Qemu(qemu::Arguments),
@@ -114,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::Nonlinearity(arguments) => nonlinearity::run(&arguments),
         Command::Schedule(arguments) => schedule::run(&arguments),
         Command::Realisability(arguments) => realisability::run(&arguments),
+        Command::Faults(arguments) => faults::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),
