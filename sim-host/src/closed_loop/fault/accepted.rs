@@ -75,3 +75,14 @@ pub fn reason(fault: &Fault) -> Option<&'static str> {
     let entry = ACCEPTED.iter().find(|entry| (entry.covers)(fault.kind));
     entry.map(|entry| entry.reason)
 }
+
+/// The same of what is done to the processor.
+#[cfg(unix)]
+pub fn reason_on_processor(action: super::processor::Action) -> Option<&'static str> {
+    use super::processor::Action::Flip;
+    // Variables begin where the code is at its end on every Cortex-M.
+    let is_code = matches!(action, Flip { address, .. } if address < 0x2000_0000);
+    is_code.then_some(
+        "a bit of the program itself: both channels run it; flash with error correction, or a checksum of it, would find it",
+    )
+}

@@ -216,9 +216,13 @@ impl Judge {
         self.found(Finder::Firmware(exit_code), tick, Reaction::Ended);
     }
 
-    /// Looks at the vehicle alone, behind the ECU's end.
-    pub fn look_at_vehicle(&mut self, drive: &Drive) {
-        self.peaks = self.peaks.or(Peaks::of(drive));
+    /// The ECU puts out nothing any more: the vehicle misses its frames, the servo keeps its last duty.
+    pub fn fell_silent(&mut self) {
+        self.found(
+            Finder::Vehicle(Status::NoNewData),
+            self.injected_tick + 1,
+            Reaction::Tolerated,
+        );
     }
 
     /// What became of the fault; `stays_wrong` if a wrong value is in use.

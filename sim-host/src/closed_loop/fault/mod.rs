@@ -17,5 +17,7 @@ pub mod injector;
 pub mod judge;
 pub mod manoeuvres;
 #[cfg(unix)]
+pub mod memory;
+#[cfg(unix)]
 pub mod processor;
 pub mod tasks;
