@@ -10,6 +10,7 @@ mod sample;
 pub mod terminal;
 mod text;
 
+pub use figure::fault_matrix::draw as fault_matrix;
 pub use figure::schedule_map::draw as schedule_map;
 
 use crate::trace::Trace;

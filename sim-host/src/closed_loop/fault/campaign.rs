@@ -80,7 +80,10 @@ impl Clean {
             peaks: Vec::new(),
             moments: Vec::new(),
         };
-        let moments: Vec<u32> = times_s.iter().map(|time_s| clean.period_of(*time_s)).collect();
+        let moments: Vec<u32> = times_s
+            .iter()
+            .map(|time_s| clean.period_of(*time_s))
+            .collect();
         let mut now = Loop {
             ecu: Tasks::new(&ecu_scenario(scenario, manoeuvre))?,
             drive,
@@ -140,6 +143,8 @@ impl Clean {
 pub struct Row {
     /// Class of the fault.
     pub class: Class,
+    /// Kind of the fault.
+    pub kind: String,
     /// The fault.
     pub fault: String,
     /// The manoeuvre.
@@ -176,7 +181,7 @@ impl Row {
 
     /// Of an outcome.
     pub(super) fn new(
-        (class, fault): (Class, String),
+        (class, kind, fault): (Class, &str, String),
         (manoeuvre, level, injected_s): (&str, &'static str, f64),
         outcome: &Outcome,
         accepted: Option<&'static str>,
@@ -185,6 +190,7 @@ impl Row {
         let finding = outcome.finding;
         Self {
             class,
+            kind: kind.into(),
             fault,
             manoeuvre: manoeuvre.into(),
             level,
@@ -225,7 +231,7 @@ pub fn inject(
             let outcome = clean.inject(moment, fault);
             on_run();
             Ok(Row::new(
-                (fault.class(), fault.to_string()),
+                (fault.class(), fault.kind.name(), fault.to_string()),
                 (&clean.name, "software", moment.drive.plant().time_s()),
                 &outcome,
                 accepted::reason(&fault),

@@ -184,6 +184,85 @@ pub enum Kind {
     Timing(TimingFailure),
 }
 
+impl Kind {
+    /// Its name without what it is done to and how much.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sensor(_, failure) => failure.name(),
+            Self::Swapped(..) => "sensors swapped",
+            Self::SensorLink(failure) => failure.name(),
+            Self::ActuatorLink(failure) => match failure {
+                LinkFailure::Corruption { .. } => "actuator frame corrupted",
+                LinkFailure::Repetition => "actuator frame repeated",
+                LinkFailure::Loss => "actuator frame lost",
+                LinkFailure::Delay { .. } => "actuator frame late",
+                LinkFailure::Insertion { .. } => "actuator frame inserted",
+                LinkFailure::Masquerade => "actuator frame masqueraded",
+                LinkFailure::WrongSequence { .. } => "actuator frame out of sequence",
+            },
+            Self::Servo(failure) => failure.name(),
+            Self::ServoBehindReadback(_) => "servo, read back right",
+            Self::Timing(failure) => failure.name(),
+        }
+    }
+}
+
+impl SensorFailure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::NotANumber => "sensor NaN",
+            Self::Infinite => "sensor infinite",
+            Self::Subnormal => "sensor subnormal",
+            Self::OutOfRange => "sensor out of range",
+            Self::Stuck => "sensor stuck",
+            Self::Step(_) => "sensor step",
+            Self::Offset(_) => "sensor offset",
+            Self::Drift(_) => "sensor drift",
+            Self::DropOut => "sensor drop-out",
+        }
+    }
+}
+
+impl LinkFailure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Corruption { .. } => "sensor frame corrupted",
+            Self::Repetition => "sensor frame repeated",
+            Self::Loss => "sensor frame lost",
+            Self::Delay { .. } => "sensor frame late",
+            Self::Insertion { .. } => "sensor frame inserted",
+            Self::Masquerade => "sensor frame masqueraded",
+            Self::WrongSequence { .. } => "sensor frame out of sequence",
+        }
+    }
+}
+
+impl ServoFailure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Stuck => "duty stuck",
+            Self::Saturated { .. } => "duty saturated",
+            Self::DitherPhase { .. } | Self::DitherInverted => "dither phase",
+            Self::DitherFrequency { .. } => "dither frequency",
+            Self::Offset { .. } => "duty offset",
+        }
+    }
+}
+
+impl TimingFailure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::MissedPwm(_) => "PWM interrupt missed",
+            Self::DoublePwm(_) => "PWM interrupt doubled",
+            Self::MissedControl => "control interrupt missed",
+            Self::DoubleControl => "control interrupt doubled",
+            Self::Overrun(_) => "control task late",
+            Self::Clock(_) => "clock",
+            Self::Reset => "reset",
+        }
+    }
+}
+
 /// Class of faults, as the totals are told by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -256,7 +335,9 @@ impl fmt::Display for Fault {
             Kind::SensorLink(failure) => write!(f, "sensor frame: {failure}"),
             Kind::ActuatorLink(failure) => write!(f, "actuator frame: {failure}"),
             Kind::Servo(failure) => write!(f, "servo: {failure}"),
-            Kind::ServoBehindReadback(failure) => write!(f, "servo, read back right: {failure}"),
+            Kind::ServoBehindReadback(failure) => {
+                write!(f, "servo, read back right: {failure}")
+            }
             Kind::Timing(failure) => write!(f, "{failure}"),
         }?;
         match self.ticks {
@@ -370,9 +451,7 @@ fn sensors() -> Vec<Fault> {
 }
 
 fn links() -> Vec<Fault> {
-    use LinkFailure::{
-        Corruption, Delay, Insertion, Loss, Masquerade, Repetition, WrongSequence,
-    };
+    use LinkFailure::{Corruption, Delay, Insertion, Loss, Masquerade, Repetition, WrongSequence};
     let brief = [1, 2, 3].map(Some);
     let mut faults = Vec::new();
     let mut add = |failure, ticks: &[Option<u32>]| {

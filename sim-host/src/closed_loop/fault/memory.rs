@@ -47,12 +47,12 @@ impl Region {
     /// Its name, for reports.
     pub fn name(self) -> &'static str {
         match self {
-            Self::ControlTask => "control task",
-            Self::PwmTask => "PWM task",
-            Self::Mailboxes => "mailboxes",
-            Self::OtherVariables => "other variables",
-            Self::Stack => "stack",
-            Self::Code => "code",
+            Self::ControlTask => "memory: control task",
+            Self::PwmTask => "memory: PWM task",
+            Self::Mailboxes => "memory: mailboxes",
+            Self::OtherVariables => "memory: other variables",
+            Self::Stack => "memory: stack",
+            Self::Code => "memory: code",
         }
     }
 

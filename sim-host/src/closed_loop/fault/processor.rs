@@ -6,6 +6,7 @@ use super::campaign::Row;
 use super::catalogue::{Class, Fault};
 use super::injector::Injector;
 use super::judge::{Judge, Outcome, Peaks};
+use super::memory::Flip;
 use super::tasks::Tasks;
 use crate::closed_loop::drive::{Drive, ecu_scenario};
 use crate::closed_loop::levels::{LevelError, Target};
@@ -102,21 +103,46 @@ impl Action {
     }
 }
 
+impl Action {
+    /// Its name without where.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Nothing => "nothing",
+            Self::Flip { .. } | Self::FlipStack { .. } => "bit flipped",
+            Self::MissPwm(_) => "PWM interrupt missed",
+            Self::DoublePwm => "PWM interrupt doubled",
+            Self::MissControl => "control interrupt missed",
+            Self::DoubleControl => "control interrupt doubled",
+            Self::Overrun => "control task late",
+            Self::HangMainLoop => "main loop hangs",
+            Self::OverflowStack => "stack overflow",
+            Self::HardFault => "jump to nowhere",
+            Self::Reset => "reset",
+        }
+    }
+
+    /// Whatever is done to the processor but flips, each once.
+    pub const EVENTS: [Self; 10] = [
+        Self::MissPwm(1),
+        Self::MissPwm(3),
+        Self::DoublePwm,
+        Self::MissControl,
+        Self::DoubleControl,
+        Self::Overrun,
+        Self::HangMainLoop,
+        Self::OverflowStack,
+        Self::HardFault,
+        Self::Reset,
+    ];
+}
+
 impl fmt::Display for Action {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::Nothing => write!(f, "nothing"),
             Self::Flip { address, bit } => write!(f, "bit {bit} at {address:#010x}"),
             Self::FlipStack { offset, bit } => write!(f, "bit {bit} at sp + {offset}"),
-            Self::MissPwm(count) => write!(f, "PWM interrupt missed {count} times"),
-            Self::DoublePwm => write!(f, "PWM interrupt doubled"),
-            Self::MissControl => write!(f, "control interrupt missed"),
-            Self::DoubleControl => write!(f, "control interrupt doubled"),
-            Self::Overrun => write!(f, "control task starved"),
-            Self::HangMainLoop => write!(f, "main loop hangs"),
-            Self::OverflowStack => write!(f, "stack overflow"),
-            Self::HardFault => write!(f, "jump to nowhere"),
-            Self::Reset => write!(f, "reset"),
+            Self::MissPwm(count) => write!(f, "{} {count} times", self.name()),
+            _ => write!(f, "{}", self.name()),
         }
     }
 }
@@ -195,7 +221,11 @@ impl Bench {
         scenario.dither.waveform = Waveform::Square;
         scenario.dither.start_time_s = 0.0;
         scenario.policy.dither_ramp_s = BENCH_RAMP_S;
-        Self::new(target, &scenario, &Manoeuvre::constant(BENCH_RPM, BENCH_REQUEST_A))
+        Self::new(
+            target,
+            &scenario,
+            &Manoeuvre::constant(BENCH_RPM, BENCH_REQUEST_A),
+        )
     }
 
     /// What the ECU puts out without fault, one a PWM period.
@@ -284,16 +314,36 @@ impl Bench {
         peaks
     }
 
-    /// A run with a fault, as a row beside those of the software.
+    /// A run with a bit flipped, as a row beside those of the software.
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn row(&self, name: String, action: Action, tick: u32) -> Result<Row, RunError> {
+    pub fn flip(&self, flip: &Flip) -> Result<Row, RunError> {
+        let name = flip.region.name();
+        self.row(
+            name,
+            format!("{name}: {}", flip.action),
+            flip.action,
+            flip.tick,
+        )
+    }
+
+    /// A run with something else done to the processor, as such a row.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn event(&self, action: Action, tick: u32) -> Result<Row, RunError> {
+        self.row(action.name(), action.to_string(), action, tick)
+    }
+
+    fn row(&self, kind: &str, fault: String, action: Action, tick: u32) -> Result<Row, RunError> {
         let outcome = self.run(action, tick)?.outcome;
         let tick_s = 1.0 / self.scenario.run.control_rate_hz;
+        let lead_in = self.drive.total_periods() - self.drive.plant().total_periods();
+        let moved = tick.saturating_sub(lead_in / self.scenario.periods_per_tick());
         Ok(Row::new(
-            (action.class(), name),
-            ("bench", "processor", f64::from(tick) * tick_s),
+            (action.class(), kind, fault),
+            ("on the processor", "processor", f64::from(moved) * tick_s),
             &outcome,
             accepted::reason_on_processor(action),
             self.clean_peaks(tick),
@@ -322,7 +372,9 @@ impl Bench {
             &[],
             target.time_out,
         )?;
-        let processor = self.through(fault, tick, |answer| exchange(&mut session, answer).map(drop))?;
+        let processor = self.through(fault, tick, |answer| {
+            exchange(&mut session, answer).map(drop)
+        })?;
         Ok([software, processor])
     }
 
@@ -422,7 +474,8 @@ impl Hand<'_> {
         let interrupt = self.places.control_interrupt;
         gdb.set_breakpoint(interrupt)?;
         // An interrupt that another one preempts at its first instruction stops there twice, so its calls are not counted here.
-        while self.finished_ticks(gdb)? + 1 < tick || gdb.read_register(Register::Pc)? != interrupt {
+        while self.finished_ticks(gdb)? + 1 < tick || gdb.read_register(Register::Pc)? != interrupt
+        {
             self.run_to_stop(gdb)?;
         }
         gdb.remove_breakpoint(interrupt)
@@ -479,7 +532,9 @@ impl Places {
         let symbol = |name| image.address_of(name).ok_or(LevelError::NoSymbol { name });
         let part = |name| {
             let symbol = image.symbols().into_iter().find(|s| s.name.contains(name));
-            symbol.map(|s| s.address).ok_or(LevelError::NoSymbol { name })
+            symbol
+                .map(|s| s.address)
+                .ok_or(LevelError::NoSymbol { name })
         };
         Ok(Self {
             pwm_interrupt: symbol("SysTick")?,

@@ -2,6 +2,7 @@
 
 pub(super) mod axis;
 mod divergence;
+pub(super) mod fault_matrix;
 mod instructions;
 mod one_step_defect;
 pub(super) mod panel;
