@@ -15,13 +15,14 @@ macro_rules! example {
 }
 
 /// Files of the manoeuvres.
-const FILES: [&str; 6] = [
+const FILES: [&str; 7] = [
     example!("constant-speed"),
     example!("constant-speed-sine"),
     example!("speed-ramp"),
     example!("step-steer"),
     example!("sine-steer"),
     example!("low-resolution-noise"),
+    example!("obeyed-speed-limit"),
 ];
 
 /// All manoeuvres, each with its scenario.

@@ -7,8 +7,8 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 
 /// The same flips in every run.
 const SEED: u64 = 4;
-/// Bytes of stack above its pointer from which a bit is taken; taken modulo the stack in use.
-const STACK_BYTES: u32 = 1 << 16;
+/// Bytes of stack above its pointer of which a bit is taken: about the control interrupt's own.
+const STACK_BYTES: u32 = 512;
 /// Data addresses start here on every Cortex-M.
 const RAM_START: u32 = 0x2000_0000;
 /// Variables that belong to the ECU's tasks, by a part of the linker's name.
@@ -107,6 +107,7 @@ pub fn flips(image: &Image, count: usize, first_tick: u32, ticks: u32) -> Vec<Fl
             });
             let action = match (region, place) {
                 (Region::Stack, _) => Action::FlipStack {
+                    seed: below(u32::MAX),
                     offset: below(STACK_BYTES),
                     bit,
                 },

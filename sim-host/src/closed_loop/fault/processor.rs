@@ -35,6 +35,8 @@ const NOWHERE: u32 = 0xF000_0000;
 /// PWM interrupts for which a control task is kept from its work: more than one control tick has.
 const HELD_INTERRUPTS: u32 = 14;
 
+/// Instructions of the control interrupt of which one is met.
+const TRIED_INSTRUCTIONS: u32 = 6;
 /// Stands for the exit code of an emulator that was killed by its own failure, as by a lockup of the core.
 const NO_EXIT_CODE: i32 = -1;
 /// Wheel speed of the bench, rpm, the driver's request, A, and the run's length, s.
@@ -58,9 +60,11 @@ pub enum Action {
         /// Number of the bit.
         bit: u8,
     },
-    /// A bit of the stack in use is flipped, while the PWM interrupt has preempted the control task.
+    /// A bit of the stack is flipped, somewhere within the control interrupt.
     FlipStack {
-        /// Bytes from the stack's pointer, taken modulo the stack in use.
+        /// Says where: a number to begin with.
+        seed: u32,
+        /// Bytes from the stack's pointer.
         offset: u32,
         /// Number of the bit.
         bit: u8,
@@ -140,7 +144,7 @@ impl fmt::Display for Action {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Flip { address, bit } => write!(f, "bit {bit} at {address:#010x}"),
-            Self::FlipStack { offset, bit } => write!(f, "bit {bit} at sp + {offset}"),
+            Self::FlipStack { offset, bit, .. } => write!(f, "bit {bit} at sp + {offset}"),
             Self::MissPwm(count) => write!(f, "{} {count} times", self.name()),
             _ => write!(f, "{}", self.name()),
         }
@@ -164,6 +168,8 @@ pub struct Bench {
 struct Places {
     pwm_interrupt: u32,
     control_interrupt: u32,
+    /// Length of its code.
+    control_bytes: u32,
     control_ticks: u32,
     idle: u32,
     stack_end: u32,
@@ -430,11 +436,10 @@ impl Hand<'_> {
         match action {
             Action::Nothing => {}
             Action::Flip { address, bit } => flip(&mut gdb, address, bit)?,
-            Action::FlipStack { offset, bit } => {
-                self.to_pwm_interrupt(&mut gdb)?;
+            Action::FlipStack { seed, offset, bit } => {
+                self.into_control_interrupt(&mut gdb, seed)?;
                 let sp = gdb.read_register(Register::Sp)?;
-                let in_use = places.stack_start - sp;
-                flip(&mut gdb, sp + offset % in_use, bit)?;
+                flip(&mut gdb, (sp + offset).min(places.stack_start - 1), bit)?;
             }
             Action::MissPwm(count) => {
                 for _ in 0..count {
@@ -488,6 +493,31 @@ impl Hand<'_> {
         gdb.remove_breakpoint(self.places.pwm_interrupt)
     }
 
+    /// To an instruction of the control interrupt at whose start the core is: the first that is met of some that `seed` gives. Where
+    /// none is met, to the main loop behind it.
+    fn into_control_interrupt(&self, gdb: &mut Gdb, seed: u32) -> Result<(), SocketError> {
+        let Places {
+            control_interrupt,
+            control_bytes,
+            idle,
+            ..
+        } = self.places;
+        let mut stops: Vec<u32> = (1..=TRIED_INSTRUCTIONS)
+            .map(|k| control_interrupt + (seed.wrapping_mul(k) % control_bytes & !1))
+            .collect();
+        stops.push(idle);
+        stops.sort_unstable();
+        stops.dedup();
+        for stop in &stops {
+            gdb.set_breakpoint(*stop)?;
+        }
+        self.run_to_stop(gdb)?;
+        for stop in stops {
+            gdb.remove_breakpoint(stop)?;
+        }
+        Ok(())
+    }
+
     /// At the first instruction of an interrupt: runs it, and then once more.
     fn call_twice(&self, gdb: &mut Gdb, interrupt: u32) -> Result<(), SocketError> {
         let back = gdb.read_register(Register::Lr)?;
@@ -530,6 +560,10 @@ impl Places {
     fn of(target: &Target) -> Result<Self, LevelError> {
         let image = &target.image;
         let symbol = |name| image.address_of(name).ok_or(LevelError::NoSymbol { name });
+        let size = |name| {
+            let symbol = image.symbols().into_iter().find(|s| s.name == name);
+            symbol.map(|s| s.size).ok_or(LevelError::NoSymbol { name })
+        };
         let part = |name| {
             let symbol = image.symbols().into_iter().find(|s| s.name.contains(name));
             symbol
@@ -539,6 +573,7 @@ impl Places {
         Ok(Self {
             pwm_interrupt: symbol("SysTick")?,
             control_interrupt: symbol("PendSV")?,
+            control_bytes: size("PendSV")?,
             control_ticks: part("13CONTROL_TICKS")?,
             idle: part("$GT$4idle17h")?,
             stack_end: symbol("_stack_end")?,

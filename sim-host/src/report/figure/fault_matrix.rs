@@ -13,6 +13,7 @@ const TOP: i32 = 190;
 const RIGHT: i32 = 16;
 const CELL_HEIGHT: i32 = 36;
 const GAP: i32 = 3;
+const NUMBER_WIDTH: i32 = 24;
 /// Characters of a manoeuvre's name in a line.
 const COLUMN_CHARACTERS: usize = 12;
 const LINE_STEP: i32 = 28;
@@ -127,7 +128,10 @@ fn cell(area: &Area, (left, top): (i32, i32), width: i32, rows: &[&Row]) -> anyh
         if count == 0 {
             continue;
         }
-        ink.get_or_insert(on_it);
+        // Of the shade on which most of the number stands.
+        if place(before + count) > left + NUMBER_WIDTH {
+            ink.get_or_insert(on_it);
+        }
         let corners = [
             (place(before), top),
             (place(before + count), top + CELL_HEIGHT - GAP),
