@@ -437,7 +437,7 @@ impl Hand<'_> {
             Action::Nothing => {}
             Action::Flip { address, bit } => flip(&mut gdb, address, bit)?,
             Action::FlipStack { seed, offset, bit } => {
-                self.into_control_interrupt(&mut gdb, seed)?;
+                self.go_into_control_interrupt(&mut gdb, seed)?;
                 let sp = gdb.read_register(Register::Sp)?;
                 flip(&mut gdb, (sp + offset).min(places.stack_start - 1), bit)?;
             }
@@ -495,7 +495,7 @@ impl Hand<'_> {
 
     /// To an instruction of the control interrupt at whose start the core is: the first that is met of some that `seed` gives. Where
     /// none is met, to the main loop behind it.
-    fn into_control_interrupt(&self, gdb: &mut Gdb, seed: u32) -> Result<(), SocketError> {
+    fn go_into_control_interrupt(&self, gdb: &mut Gdb, seed: u32) -> Result<(), SocketError> {
         let Places {
             control_interrupt,
             control_bytes,
@@ -503,7 +503,7 @@ impl Hand<'_> {
             ..
         } = self.places;
         let mut stops: Vec<u32> = (1..=TRIED_INSTRUCTIONS)
-            .map(|k| control_interrupt + (seed.wrapping_mul(k) % control_bytes & !1))
+            .map(|k| control_interrupt + ((seed.wrapping_mul(k) % control_bytes) & !1))
             .collect();
         stops.push(idle);
         stops.sort_unstable();
