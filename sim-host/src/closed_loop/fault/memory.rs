@@ -8,7 +8,7 @@ use rand_pcg::rand_core::{Rng, SeedableRng};
 /// The same flips in every run.
 const SEED: u64 = 4;
 /// Bytes of stack above its pointer of which a bit is taken: about the control interrupt's own.
-const STACK_BYTES: u32 = 512;
+const STACK_BYTES: u32 = 1536;
 /// Data addresses start here on every Cortex-M.
 const RAM_START: u32 = 0x2000_0000;
 /// Variables that belong to the ECU's tasks, by a part of the linker's name.
