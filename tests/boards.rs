@@ -20,6 +20,8 @@ const STM32F405: Machine = Machine::NetduinoPlus2;
 const STM32F405_TIMER_HZ: f32 = 16e6;
 const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
 const BAD_SCENARIO: i32 = 10;
+/// Start of every Cortex-M's RAM.
+const RAM_START: u64 = 0x2000_0000;
 
 /// Registers of TIM3, as in the reference manual RM0090, 18.4.
 const TIM3: u32 = 0x4000_0400;
@@ -199,7 +201,7 @@ fn without_a_word_about_it_the_timer_is_the_boards() {
 /// The trailer's duty is read back from the timer. No watchdog here: the emulator has none for this chip.
 #[test]
 fn faults_put_the_timer_to_neutral() {
-    for (fault, exit_code) in [("panic", 13), ("hard-fault", 14)] {
+    for (fault, exit_code) in [("panic", 13), ("hard-fault", 14), ("stack-overflow", 14)] {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let image = board_image(STM32F405.board(), "fault-drill");
         let finished = run(&image, STM32F405, &[fault.into()], folder.path(), TIME_OUT)
@@ -217,23 +219,25 @@ fn faults_put_the_timer_to_neutral() {
 /// What an image needs fits its board's memory map, which it is linked to.
 #[test]
 fn every_image_fits_its_board() {
-    // Some times the deepest stack that the runs report.
-    const LEFT_FOR_STACK: u64 = 16 * 1024;
     for board in BOARDS {
         let map = memory_map(board);
         for name in ["ecu", "fault-drill"] {
             let image = board_image(board, name);
-            let (flash, ram) = (region(&map, "FLASH"), region(&map, "RAM"));
+            let [flash, stack, ram] = ["FLASH", "STACK", "RAM"].map(|name| region(&map, name));
             let start = image.address_of("__vector_table").map(u64::from);
             assert_eq!(start, Some(flash.0), "{board}: {name}");
-            let end = image.address_of("_stack_start").map(u64::from);
-            assert_eq!(end, Some(ram.0 + ram.1), "{board}: {name}");
+            let ends = ["_stack_end", "_stack_start"].map(|end| image.address_of(end));
+            let ends = ends.map(|end| end.map(u64::from));
+            let stack_end = stack.0 + stack.1;
+            assert_eq!(ends, [Some(stack.0), Some(stack_end)], "{board}: {name}");
+            // Below the stack is no RAM, so that an overflow faults.
+            assert_eq!((stack.0, stack_end), (RAM_START, ram.0), "{board}: {name}");
             println!(
                 "{board} {name}: {} of {} bytes of flash, {} of {} of RAM",
                 image.flash_bytes, flash.1, image.ram_bytes, ram.1
             );
             assert!(image.flash_bytes <= flash.1, "{board}: {name}");
-            assert!(image.ram_bytes + LEFT_FOR_STACK <= ram.1, "{board}: {name}");
+            assert!(image.ram_bytes <= ram.1, "{board}: {name}");
         }
     }
 }

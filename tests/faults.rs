@@ -14,7 +14,12 @@ const WATCHDOG: i32 = 15;
 
 #[test]
 fn each_fault_neutralises_the_pwm_and_has_its_exit_code() {
-    for (fault, exit_code) in [("panic", 13), ("hard-fault", 14), ("watchdog", 15)] {
+    for (fault, exit_code) in [
+        ("panic", 13),
+        ("hard-fault", 14),
+        ("stack-overflow", 14),
+        ("watchdog", 15),
+    ] {
         for machine in [Machine::Mps2An386, Machine::Mps2An500] {
             let folder = tempfile::tempdir().expect("a temporary folder can be made");
             let finished = run(

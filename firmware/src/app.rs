@@ -22,6 +22,7 @@ const CONTROL_PRIORITY: u8 = 0xE0;
 
 /// Runs the scenario of the command line to its end.
 pub fn run() -> ExitCode {
+    stack::guard();
     stack::paint();
     log::open();
     let command = match command_line::read() {

@@ -3,7 +3,8 @@
 use crate::board::{Board, Current};
 use crate::exit::{ExitCode, exit};
 use crate::recorder;
-use cortex_m_rt::{ExceptionFrame, exception};
+use core::arch::naked_asm;
+use cortex_m_rt::exception;
 
 /// The safe state, and the end of the run: PWM neutral, trailer written, exit code given.
 pub fn end_safely(code: ExitCode) -> ! {
@@ -14,9 +15,22 @@ pub fn end_safely(code: ExitCode) -> ! {
     exit(code)
 }
 
-// SAFETY: touches only atomics, device registers and the host, so it may interrupt anything; and it does not return.
-#[exception]
-unsafe fn HardFault(_frame: &ExceptionFrame) -> ! {
+/// Takes the whole stack for its own: after an overflow there is none left.
+// SAFETY: sets the stack pointer to the top of the stack and goes on; what was on the stack is not needed any more, as nothing
+// returns from here.
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")]
+#[unsafe(link_section = ".HardFault.ecu")]
+unsafe extern "C" fn hard_fault() -> ! {
+    naked_asm!(
+        "ldr r0, =_stack_start",
+        "msr msp, r0",
+        "b {}",
+        sym end_hard_fault,
+    )
+}
+
+extern "C" fn end_hard_fault() -> ! {
     end_safely(ExitCode::HardFault)
 }
 

@@ -1,7 +1,7 @@
 //! Fault drill: the ECU's fault handlers, set off on purpose. The first argument says which.
 //!
-//! `panic`, `hard-fault`, `watchdog` (the main loop stops feeding it) and `hang` (interrupts and watchdog off, for the
-//! runner's time-out).
+//! `panic`, `hard-fault`, `stack-overflow`, `watchdog` (the main loop stops feeding it) and `hang` (interrupts and watchdog
+//! off, for the runner's time-out).
 
 #![no_std]
 #![no_main]
@@ -17,6 +17,7 @@ use shared_model::telemetry::Header;
 
 #[cortex_m_rt::entry]
 fn main() -> ! {
+    stack::guard();
     stack::paint();
     drive_pwm();
     let text = command_line::text().unwrap_or("");
@@ -26,6 +27,9 @@ fn main() -> ! {
         Some("hard-fault") => unsafe {
             core::ptr::read_volatile(0xF000_0000 as *const u32);
         },
+        Some("stack-overflow") => {
+            overflow(0);
+        }
         Some("watchdog") => Current::start_watchdog(20),
         Some("hang") => cortex_m::interrupt::disable(),
         _ => fault::end_safely(ExitCode::BadScenario),
@@ -33,6 +37,14 @@ fn main() -> ! {
     loop {
         core::hint::spin_loop();
     }
+}
+
+/// Calls itself until there is no stack left.
+#[inline(never)]
+#[expect(unconditional_recursion)]
+fn overflow(depth: u32) -> u32 {
+    // The optimiser must not make a loop of it.
+    core::hint::black_box(overflow(depth.wrapping_add(1))) ^ depth
 }
 
 /// Brings the PWM off its neutral duty, so that the way back shows in the trailer of `drill.bin`.

@@ -6,6 +6,7 @@ mod config;
 mod convergence;
 mod decode;
 mod equilibria;
+mod faults;
 mod image;
 mod lyapunov;
 mod nonlinearity;
@@ -72,6 +73,7 @@ enum Command {
     Nonlinearity(nonlinearity::Arguments),
     Schedule(schedule::Arguments),
     Realisability(realisability::Arguments),
+    Faults(faults::Arguments),
     Config(config::Arguments),
     Decode(decode::Arguments),
     Image(image::Arguments),
@@ -119,6 +121,7 @@ pub fn main() -> ExitCode {
         Command::Nonlinearity(arguments) => nonlinearity::run(&arguments),
         Command::Schedule(arguments) => schedule::run(&arguments),
         Command::Realisability(arguments) => realisability::run(&arguments),
+        Command::Faults(arguments) => faults::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Image(arguments) => image::run(&arguments),

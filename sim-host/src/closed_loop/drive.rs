@@ -3,18 +3,19 @@
 //! An ECU starts with a neutral servo and slews to the driver's request. So that this is over when the manoeuvre begins, the
 //! vehicle is held in its initial state meanwhile, its sensors on: the lead-in.
 
+use super::disturbance::{Disturbance, Undisturbed};
 use super::manoeuvre::Manoeuvre;
 use super::plant::{InvalidPlant, Plant};
 use super::record::Record;
 use super::sensor::Sensors;
 use shared_model::Scenario;
-use shared_model::e2e::{Receiver, Sender};
+use shared_model::e2e::{Receiver, Sender, Status};
 use shared_model::exchange::{FrameBytes, Packet};
 use shared_model::frame::{
     ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_actuation, encode_measurement,
 };
 use shared_model::servo::Duty;
-use shared_model::signal::{Actuation, Measurement};
+use shared_model::signal::Actuation;
 
 /// Control ticks of the lead-in beyond the slewing.
 const SPARE_TICKS: f64 = 20.0;
@@ -47,6 +48,7 @@ pub struct Drive {
     periods: u32,
     lead_in_periods: u32,
     actuation: Option<Actuation<f32>>,
+    frame_status: Status,
 }
 
 impl Drive {
@@ -67,43 +69,52 @@ impl Drive {
             periods: 0,
             lead_in_periods: periods_a_tick * lead_in_ticks(scenario, manoeuvre),
             actuation: None,
+            frame_status: Status::NoNewData,
         })
     }
 
     /// Takes what the ECU put out for a period, moves through it, and answers with the duty on the servo's pin and, where a
     /// control tick is due, a sensor frame.
     pub fn answer(&mut self, from_ecu: &Packet) -> Packet {
-        if let Some(frame) = &from_ecu.frame {
-            self.take(frame);
-        }
-        // The servo's driver has no more counts than its period.
-        let code = from_ecu.duty_code.min(self.period_counts);
-        let duty = Duty::new(code, self.period_counts).expect("cut to the period above");
-        if self.periods >= self.lead_in_periods {
-            self.plant.step(duty);
-        }
+        self.answer_through(&mut Undisturbed, from_ecu)
+    }
+
+    /// The same through what comes between vehicle and ECU.
+    pub fn answer_through(&mut self, between: &mut dyn Disturbance, from_ecu: &Packet) -> Packet {
         self.periods += 1;
         let is_tick = self.periods.is_multiple_of(self.periods_a_tick);
+        let frame = between.actuator_frame(from_ecu.frame);
+        if is_tick || frame.is_some() {
+            self.take(frame.as_ref());
+        }
+        let codes = between.duty(from_ecu.duty_code);
+        // The servo's driver has no more counts than its period.
+        let [driven, captured] =
+            [codes.driven, codes.captured].map(|code| code.min(self.period_counts));
+        let duty = Duty::new(driven, self.period_counts).expect("cut to the period above");
+        if self.has_begun() {
+            self.plant.step(duty);
+        }
+        let frame = is_tick.then(|| {
+            let told = self.sensors.sample(&self.plant.truth());
+            encode_measurement(&between.measurement(told), &mut self.sender)
+        });
         Packet {
-            duty_code: code,
-            frame: is_tick.then(|| self.sensor_frame()),
+            duty_code: captured,
+            frame: between.sensor_frame(frame),
         }
     }
 
-    fn take(&mut self, frame: &FrameBytes) {
-        if !self.receiver.check(Some(frame)).is_ok() {
+    fn take(&mut self, frame: Option<&FrameBytes>) {
+        self.frame_status = self.receiver.check(frame);
+        let Some(frame) = frame.filter(|_| self.frame_status.is_ok()) else {
             return;
-        }
+        };
         if let Ok(actuation) = decode_actuation(frame) {
             let limit_rpm = f64::from(actuation.wheel_speed_limit_rpm);
             self.plant.set_wheel_speed_limit_rpm(limit_rpm);
             self.actuation = Some(actuation);
         }
-    }
-
-    fn sensor_frame(&mut self) -> FrameBytes {
-        let measurement: Measurement<f32> = self.sensors.sample(&self.plant.truth());
-        encode_measurement(&measurement, &mut self.sender)
     }
 
     /// PWM periods from the ECU's start to the manoeuvre's end.
@@ -119,6 +130,16 @@ impl Drive {
     /// What the ECU last told.
     pub fn actuation(&self) -> Option<&Actuation<f32>> {
         self.actuation.as_ref()
+    }
+
+    /// What the last check of an actuator frame found; one is due at every control tick.
+    pub fn frame_status(&self) -> Status {
+        self.frame_status
+    }
+
+    /// PWM periods from the ECU's start.
+    pub fn periods(&self) -> u32 {
+        self.periods
     }
 
     /// The vehicle.

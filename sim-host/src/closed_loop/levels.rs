@@ -37,6 +37,12 @@ pub enum LevelError {
     /// The emulator or the firmware did not do as it should.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// The image is not one of this firmware.
+    #[error("the image has no {name}")]
+    NoSymbol {
+        /// What is looked for in it.
+        name: &'static str,
+    },
     /// The firmware ended the run with a code of its own.
     #[error("the firmware ended with exit code {exit_code}: {}", meaning(*exit_code))]
     Firmware {

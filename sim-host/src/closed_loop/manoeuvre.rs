@@ -210,13 +210,13 @@ pub fn load(path: &Path) -> Result<(Scenario<f64>, Manoeuvre), ManoeuvreError> {
     parse(config::read(path)?)
 }
 
-/// Reads a manoeuvre from text, as [`load`] does from a file.
+/// Reads the text of a manoeuvre's file, as [`load`] does.
 ///
 /// # Errors
 /// As [`load`].
 pub fn from_text(text: &str) -> Result<(Scenario<f64>, Manoeuvre), ManoeuvreError> {
-    let table = toml::from_str(text);
-    parse(table.map_err(|error| ManoeuvreError::Table(Box::new(error)))?)
+    let file = text.parse::<Table>();
+    parse(file.map_err(|error| ManoeuvreError::Table(Box::new(error)))?)
 }
 
 fn parse(mut file: Table) -> Result<(Scenario<f64>, Manoeuvre), ManoeuvreError> {

@@ -9,11 +9,14 @@
 //! | what do driver and road do, as a file? | [`manoeuvre`], [`profile`] |
 //! | where does the ECU run: as a model, as software, on a processor? | [`ecu`] |
 //! | who answers the ECU? | [`drive`] |
+//! | what goes wrong between the two, and is it found? | [`disturbance`], [`fault`] |
 //! | do all levels command the same? | [`levels`], [`run`] |
 //! | what is recorded? | [`record`] of the vehicle, [`recording`] of the exchange |
 
+pub mod disturbance;
 pub mod drive;
 pub mod ecu;
+pub mod fault;
 pub mod levels;
 pub mod manoeuvre;
 pub mod plant;

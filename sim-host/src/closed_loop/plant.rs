@@ -155,6 +155,11 @@ impl Plant {
         (self.rad_per_volt * self.parts.dither_v).clamp(-limit_rad, limit_rad)
     }
 
+    /// Slip angle of the front tyres, rad.
+    pub fn front_slip_angle_rad(&self) -> f64 {
+        self.model.slip_angles(&self.state.x).0
+    }
+
     /// What ideal sensors would tell now, and what the driver asks for.
     pub fn truth(&self) -> Measurement<f64> {
         let x = &self.state.x;

@@ -79,7 +79,8 @@ impl Stack {
     /// If it is damaged, was compiled without the functions' frames, or lacks a symbol that every image of the firmware has.
     pub fn analyse(bytes: &[u8]) -> Result<Self, AnalysisError> {
         let file = object::File::parse(bytes)?;
-        let room = address_of(&file, "_stack_start")?.saturating_sub(address_of(&file, "__sheap")?);
+        let room =
+            address_of(&file, "_stack_start")?.saturating_sub(address_of(&file, "_stack_end")?);
         Self::of(&CallGraph::read(bytes)?, &LEVELS, room as u32)
     }
 

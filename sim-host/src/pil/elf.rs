@@ -96,6 +96,53 @@ impl Image {
         let thumb = u64::from(symbol.kind() == object::SymbolKind::Text);
         u32::try_from(symbol.address() & !thumb).ok()
     }
+
+    /// All functions and variables.
+    pub fn symbols(&self) -> Vec<Symbol> {
+        let Ok(file) = object::File::parse(&*self.bytes) else {
+            return Vec::new();
+        };
+        let mut symbols: Vec<Symbol> = file
+            .symbols()
+            .filter(|symbol| symbol.size() > 0)
+            .filter_map(|symbol| {
+                let is_code = symbol.kind() == object::SymbolKind::Text;
+                Some(Symbol {
+                    name: symbol.name().ok()?.to_owned(),
+                    address: u32::try_from(symbol.address() & !u64::from(is_code)).ok()?,
+                    size: u32::try_from(symbol.size()).ok()?,
+                    is_code,
+                })
+            })
+            .collect();
+        symbols.sort_by_key(|symbol| (symbol.address, symbol.size));
+        symbols
+    }
+
+    /// Address of the first place among the code that holds this halfword, low byte first.
+    pub fn find_code(&self, halfword: [u8; 2]) -> Option<u32> {
+        let file = object::File::parse(&*self.bytes).ok()?;
+        let section = file.section_by_name(".text")?;
+        let index = section
+            .data()
+            .ok()?
+            .chunks_exact(2)
+            .position(|pair| pair == halfword)?;
+        u32::try_from(section.address() + 2 * index as u64).ok()
+    }
+}
+
+/// A function or a variable.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Symbol {
+    /// The linker's name.
+    pub name: String,
+    /// First address.
+    pub address: u32,
+    /// Bytes.
+    pub size: u32,
+    /// A function.
+    pub is_code: bool,
 }
 
 /// The compiler's line among those of all tools that had a hand in it.

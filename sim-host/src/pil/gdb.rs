@@ -10,8 +10,9 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
-/// Interrupts and timers go on in single steps.
-const STEP_AS_IN_A_RUN: &str = "Qqemu.sstep=1";
+/// In single steps interrupts wait and timers stand: a step past a breakpoint else enters the interrupt that the stop has made
+/// due, and the core comes back to the breakpoint without having passed it.
+const STEP_ALONE: &str = "Qqemu.sstep=7";
 /// Size of a Thumb breakpoint as the protocol has it, bytes.
 const THUMB_BREAKPOINT: u32 = 2;
 
@@ -76,7 +77,7 @@ impl Gdb {
         if !description.starts_with(['l', 'm']) {
             return Err(SocketError::NotUnderstood(description));
         }
-        gdb.acknowledged(STEP_AS_IN_A_RUN)?;
+        gdb.acknowledged(STEP_ALONE)?;
         Ok(gdb)
     }
 

@@ -11,6 +11,7 @@ pub mod terminal;
 mod text;
 
 pub use figure::drive::draw as drive;
+pub use figure::fault_matrix::draw as fault_matrix;
 pub use figure::schedule_map::draw as schedule_map;
 
 use crate::closed_loop::run::Run;

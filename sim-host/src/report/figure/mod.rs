@@ -3,6 +3,7 @@
 pub(super) mod axis;
 mod divergence;
 pub(super) mod drive;
+pub(super) mod fault_matrix;
 mod instructions;
 mod one_step_defect;
 pub(super) mod panel;

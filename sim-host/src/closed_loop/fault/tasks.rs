@@ -1,0 +1,171 @@
+//! The ECU's program on the host with its two tasks as the firmware's interrupts run them, so that an interrupt can fail.
+
+use super::catalogue::TimingFailure;
+use shared_model::ecu::{ControlInput, ControlOutput, ControlTask, Ecu, PwmTask};
+use shared_model::exchange::{FrameBytes, Packet};
+use shared_model::{InvalidScenario, Scenario};
+
+/// Counts a second of the independent clock.
+const CLOCK_HZ: u32 = 25_000_000;
+
+/// A control task that is not done yet.
+#[derive(Debug, Clone)]
+struct Pending {
+    input: ControlInput,
+    /// PWM periods till it is done; `None` if it never is.
+    periods: Option<u32>,
+}
+
+/// The program and its interrupts.
+#[derive(Debug, Clone)]
+pub struct Tasks {
+    scenario: Scenario<f32>,
+    pwm: PwmTask<f32>,
+    control: ControlTask<f32>,
+    output: Option<ControlOutput<f32>>,
+    frame: Option<FrameBytes>,
+    pending: Option<Pending>,
+    counts_a_period: f64,
+    clock_ratio: f64,
+    counts: f64,
+    counts_at_tick: f64,
+    duty_code: u16,
+    failure: Option<TimingFailure>,
+}
+
+impl Tasks {
+    /// The program of a scenario.
+    ///
+    /// # Errors
+    /// If the scenario is not valid.
+    pub fn new(scenario: &Scenario<f32>) -> Result<Self, InvalidScenario> {
+        let Ecu { pwm, control, .. } = Ecu::new(scenario, CLOCK_HZ)?;
+        Ok(Self {
+            scenario: *scenario,
+            duty_code: pwm.neutral().code(),
+            pwm,
+            control,
+            output: None,
+            frame: None,
+            pending: None,
+            counts_a_period: f64::from(CLOCK_HZ) / f64::from(scenario.run.pwm_rate_hz),
+            clock_ratio: 1.0,
+            counts: 0.0,
+            counts_at_tick: 0.0,
+            failure: None,
+        })
+    }
+
+    /// From now on interrupts or clock fail. Call right behind a control tick.
+    pub fn fail(&mut self, failure: TimingFailure) {
+        match failure {
+            TimingFailure::Clock(ratio) => self.clock_ratio = ratio,
+            TimingFailure::Reset => {
+                *self = Self::new(&self.scenario).expect("it was valid before");
+            }
+            _ => self.failure = Some(failure),
+        }
+    }
+
+    /// One PWM period; `answer` as for any ECU in the loop.
+    pub fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) {
+        self.counts += self.counts_a_period * self.clock_ratio;
+        match self.failure {
+            Some(TimingFailure::MissedPwm(count)) => {
+                self.failure = (count > 1).then_some(TimingFailure::MissedPwm(count - 1));
+                self.miss(answer);
+            }
+            Some(TimingFailure::DoublePwm(count)) => {
+                self.failure = (count > 1).then_some(TimingFailure::DoublePwm(count - 1));
+                let mut first = None;
+                self.interrupt(&mut |sent| {
+                    first = sent.frame;
+                    Packet {
+                        duty_code: sent.duty_code,
+                        frame: None,
+                    }
+                });
+                // The second call's duty overwrites the first's before the period is over.
+                self.interrupt(&mut |sent| {
+                    answer(&Packet {
+                        duty_code: sent.duty_code,
+                        frame: sent.frame.or(first),
+                    })
+                });
+            }
+            _ => self.interrupt(answer),
+        }
+    }
+
+    /// A period without PWM interrupt: the servo keeps its duty, and a sensor frame waits.
+    fn miss(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) {
+        let reply = answer(&Packet {
+            duty_code: self.duty_code,
+            frame: None,
+        });
+        self.frame = reply.frame.or(self.frame);
+    }
+
+    fn interrupt(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) {
+        let period = self.pwm.begin();
+        let output = self.output.take_if(|_| period.control_due);
+        let frame = output.as_ref().map(|output| output.frame);
+        if let Some(output) = output {
+            self.pwm.accept(&output);
+        }
+        self.duty_code = period.duty.code();
+        let reply = answer(&Packet {
+            duty_code: self.duty_code,
+            frame,
+        });
+        self.pwm.end(reply.duty_code);
+        self.frame = reply.frame.or(self.frame);
+        if period.control_due {
+            self.call_control();
+        }
+        self.run_pending();
+    }
+
+    fn call_control(&mut self) {
+        let input = ControlInput {
+            frame: self.frame.take(),
+            elapsed_counts: (self.counts - self.counts_at_tick) as u32,
+            found_by_pwm: self.pwm.faults(),
+        };
+        self.counts_at_tick = self.counts;
+        if let Some(late) = &mut self.pending {
+            self.pwm.report_late_control();
+            // It is at work still, or is called now; either way on the newer input.
+            late.input = input;
+            late.periods = late.periods.or(Some(0));
+            return;
+        }
+        let periods = match self.failure.take() {
+            Some(TimingFailure::MissedControl) => None,
+            Some(TimingFailure::Overrun(periods)) => Some(periods),
+            Some(TimingFailure::DoubleControl) => {
+                self.control.run(&input);
+                Some(0)
+            }
+            other => {
+                self.failure = other;
+                Some(0)
+            }
+        };
+        self.pending = Some(Pending { input, periods });
+    }
+
+    fn run_pending(&mut self) {
+        let Some(pending) = &mut self.pending else {
+            return;
+        };
+        match &mut pending.periods {
+            Some(0) => {
+                self.output = Some(self.control.run(&pending.input));
+                self.pending = None;
+            }
+            Some(periods) => *periods -= 1,
+            None => {}
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Faults by manoeuvres: what became of them, and how late the last of each kind was found.
+
+use super::style::{Area, FAINT_INK, INK, Sample, TEXT_FONT, TICK_FONT, WIDTH, figure, text};
+use crate::closed_loop::fault::campaign::Row;
+use crate::closed_loop::fault::judge::Verdict;
+use crate::report::text::wrap;
+use plotters::prelude::*;
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+
+/// Room left of the matrix, above it and right of it.
+const LEFT: i32 = 470;
+const TOP: i32 = 190;
+const RIGHT: i32 = 16;
+const CELL_HEIGHT: i32 = 36;
+const GAP: i32 = 3;
+const NUMBER_WIDTH: i32 = 24;
+/// Characters of a manoeuvre's name in a line.
+const COLUMN_CHARACTERS: usize = 12;
+const LINE_STEP: i32 = 28;
+
+/// What became of faults, from dark to light, and the colour of text on it.
+const SHADES: [(Verdict, &str, RGBColor, RGBColor); 4] = [
+    (
+        Verdict::Detected,
+        "detected: safe state, restart or neutral",
+        RGBColor(0x24, 0x44, 0x77),
+        WHITE,
+    ),
+    (
+        Verdict::Tolerated,
+        "detected and tolerated",
+        RGBColor(0x74, 0x93, 0xbd),
+        BLACK,
+    ),
+    (
+        Verdict::Silent,
+        "silent, on the list of those that may be",
+        RGBColor(0xf0, 0xb8, 0x5a),
+        BLACK,
+    ),
+    (
+        Verdict::Harmless,
+        "harmless",
+        RGBColor(0xe6, 0xe8, 0xe6),
+        BLACK,
+    ),
+];
+/// Silent and not on the list.
+const UNLISTED: RGBColor = RGBColor(0xc0, 0x10, 0x10);
+
+/// The matrix of all kinds of faults by all manoeuvres, as an SVG document.
+///
+/// # Errors
+/// If the drawing library fails.
+pub fn draw(rows: &[Row]) -> anyhow::Result<String> {
+    let kinds = distinct(rows.iter().map(|row| row.kind.as_str()));
+    let manoeuvres = distinct(rows.iter().map(|row| row.manoeuvre.as_str()));
+    let heading = "Faults by manoeuvre: shares of what became of them; number: worst latency, control ticks (1 ms)";
+    let height = TOP + CELL_HEIGHT * kinds.len() as i32 + RIGHT;
+    let mut legend: Vec<_> = SHADES
+        .iter()
+        .map(|(_, name, shade, _)| ((*name).to_owned(), Sample::Shade(*shade)))
+        .collect();
+    if rows.iter().any(Row::is_unlisted) {
+        legend.push(("silent, not on it".into(), Sample::Shade(UNLISTED)));
+    }
+    figure(heading, &legend, height as u32, |area| {
+        let width = (WIDTH as i32 - LEFT - RIGHT) / manoeuvres.len().max(1) as i32;
+        names(area, &kinds, &manoeuvres, width)?;
+        for (k, kind) in kinds.iter().enumerate() {
+            for (m, manoeuvre) in manoeuvres.iter().enumerate() {
+                let is_here = |row: &&Row| row.kind == *kind && row.manoeuvre == *manoeuvre;
+                let here: Vec<&Row> = rows.iter().filter(is_here).collect();
+                let corner = (LEFT + width * m as i32, TOP + CELL_HEIGHT * k as i32);
+                cell(area, corner, width, &here)?;
+            }
+        }
+        Ok(())
+    })
+}
+
+fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut distinct = Vec::new();
+    for name in names {
+        if !distinct.contains(&name) {
+            distinct.push(name);
+        }
+    }
+    distinct
+}
+
+fn names(area: &Area, kinds: &[&str], manoeuvres: &[&str], width: i32) -> anyhow::Result<()> {
+    let right = |colour| text(TICK_FONT, colour).pos(Pos::new(HPos::Right, VPos::Center));
+    let middle = text(TICK_FONT, INK).pos(Pos::new(HPos::Center, VPos::Center));
+    for (k, kind) in kinds.iter().enumerate() {
+        let y = TOP + CELL_HEIGHT * k as i32 + CELL_HEIGHT / 2;
+        area.draw_text(kind, &right(INK), (LEFT - 12, y))?;
+    }
+    for (m, manoeuvre) in manoeuvres.iter().enumerate() {
+        let lines = wrap(manoeuvre, COLUMN_CHARACTERS);
+        let x = LEFT + width * m as i32 + width / 2;
+        for (n, line) in lines.iter().rev().enumerate() {
+            let y = TOP - LINE_STEP / 2 - 6 - LINE_STEP * n as i32;
+            area.draw_text(line, &middle, (x, y))?;
+        }
+    }
+    let axes = text(TEXT_FONT, FAINT_INK);
+    area.draw_text("manoeuvre \u{2192}", &axes, (LEFT - 190, TOP - 50))?;
+    area.draw_text("kind of fault \u{2193}", &axes, (LEFT - 190, TOP - 20))?;
+    Ok(())
+}
+
+/// The shares of the verdicts side by side, and the worst latency on the first.
+fn cell(area: &Area, (left, top): (i32, i32), width: i32, rows: &[&Row]) -> anyhow::Result<()> {
+    if rows.is_empty() {
+        return Ok(());
+    }
+    let usable = f64::from(width - GAP);
+    let place = |count: usize| left + (usable * count as f64 / rows.len() as f64).round() as i32;
+    let mut before = 0;
+    let unlisted = rows.iter().filter(|row| row.is_unlisted()).count();
+    let mut ink = None;
+    let listed = SHADES.iter().map(|(verdict, _, shade, on_it)| {
+        let is_it = |row: &&&Row| row.verdict == *verdict && !row.is_unlisted();
+        (rows.iter().filter(is_it).count(), *shade, *on_it)
+    });
+    for (count, shade, on_it) in [(unlisted, UNLISTED, WHITE)].into_iter().chain(listed) {
+        if count == 0 {
+            continue;
+        }
+        // Of the shade on which most of the number stands.
+        if place(before + count) > left + NUMBER_WIDTH {
+            ink.get_or_insert(on_it);
+        }
+        let corners = [
+            (place(before), top),
+            (place(before + count), top + CELL_HEIGHT - GAP),
+        ];
+        area.draw(&Rectangle::new(corners, shade.filled()))?;
+        before += count;
+    }
+    if let Some(latency) = rows.iter().filter_map(|row| row.latency_ticks).max() {
+        let style = text(TICK_FONT, ink.unwrap_or(INK));
+        let at = (left + 8, top + (CELL_HEIGHT - GAP) / 2);
+        area.draw_text(&latency.to_string(), &style, at)?;
+    }
+    Ok(())
+}
