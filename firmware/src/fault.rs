@@ -30,12 +30,14 @@ unsafe extern "C" fn hard_fault() -> ! {
     )
 }
 
+// SAFETY: the one function of that name. It has one for the sake of the stack's bound, which begins here, behind the assembly.
+#[unsafe(no_mangle)]
 extern "C" fn end_hard_fault() -> ! {
     end_safely(ExitCode::HardFault)
 }
 
 /// The watchdog's interrupt.
-// SAFETY: as above.
+// SAFETY: touches only atomics, device registers and the host, so it may interrupt anything; and it does not return.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
     end_safely(ExitCode::Watchdog)

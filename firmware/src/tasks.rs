@@ -96,13 +96,10 @@ pub fn saturate(counts: u32) -> u16 {
 fn SysTick() {
     static mut INTERRUPT: Option<PwmInterrupt> = None;
     let start = Current::cost_counter();
-    if INTERRUPT.is_some() {
-        spacing::note(start);
-    } else {
+    if INTERRUPT.is_none() {
         *INTERRUPT = critical_section::with(|cs| PWM_START.borrow(cs).take());
-        spacing::begin(start);
     }
-    SAMPLES.fetch_add(1, Ordering::Relaxed);
+    spacing::note(SAMPLES.fetch_add(1, Ordering::Relaxed), start);
     match INTERRUPT {
         Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),

@@ -28,7 +28,7 @@ const MOST_NAMED: usize = 20;
 ///
 /// Sensors, links, servo and interrupts fail on all manoeuvres with the ECU's program on this host, memory and core on a short
 /// run of the firmware in QEMU. A fault is silent if nobody finds it and the ECU commands something else than without it, or
-/// works on a wrong value. About two minutes on 2 cores. Exit code 1 if a fault is silent that is not on the list of those that
+/// works on a wrong value. Three to four minutes on 2 cores. Exit code 1 if a fault is silent that is not on the list of those that
 /// may be.
 #[derive(Args)]
 #[command(after_help = "Examples:

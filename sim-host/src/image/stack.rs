@@ -32,7 +32,8 @@ const LEVELS: [(&str, &[&str]); 5] = [
     ("main program", &["Reset"]),
     ("control task", &["PendSV"]),
     ("PWM interrupt", &["SysTick", "DefaultHandler"]),
-    ("hard fault", &["HardFault"]),
+    // HardFault itself moves the stack pointer back to the top; this is counted all the same as if it lay below the others.
+    ("hard fault", &["end_hard_fault"]),
     ("watchdog", &["NonMaskableInt"]),
 ];
 
