@@ -87,8 +87,8 @@ impl Llvm {
     fn lines(&self, pinned: &str, folder: &Path, profiles: &Path) -> Result<String> {
         let merged = folder.join("merged.profdata");
         let mut merge = Command::new(&self.profdata);
-        merge.args(["merge", "--sparse", "--output"]).arg(&merged);
-        merge.args(files(profiles)?);
+        merge.args(["merge", "--sparse", "--output"]);
+        merge.arg(&merged).arg(profiles);
         process::run(&mut merge)?;
 
         let mut export = Command::new(&self.cov);
@@ -102,11 +102,6 @@ impl Llvm {
         export.arg("--sources").args(sources);
         process::capture(&mut export).context("llvm-cov does not read what the tests counted")
     }
-}
-
-fn files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
-    entries.collect()
 }
 
 /// The tests' programs, as cargo names them: `Executable tests/gate.rs (/path/of/program)`.

@@ -58,7 +58,7 @@ fn program(tools: &Path) -> PathBuf {
 }
 
 fn ensure(pinned: &str, tools: &Path) -> Result<()> {
-    let version = process::capture(Command::new(program(tools)).arg("--version"));
+    let version = process::capture(Command::new(program(tools)).args(["mutants", "--version"]));
     if version.is_some_and(|line| line.ends_with(VERSION)) {
         return Ok(());
     }
