@@ -131,7 +131,7 @@ impl Sensors {
     /// What the ECU is told at a control tick at which `truth` is so. The driver's request is no sensor's: it is as late as the
     /// rest, but neither noisy nor rounded.
     pub fn sample(&mut self, truth: &Measurement<f64>) -> Measurement<f32> {
-        let now = self.measure(truth).map(&|value| value as f32);
+        let now = self.measure(truth).map(&as_told);
         if self.late.is_empty() {
             self.late.resize(self.settings.delay_ticks, now);
         }
@@ -180,4 +180,10 @@ fn rounded(value: f64, resolution: f64) -> f64 {
     } else {
         value
     }
+}
+
+/// As a sensor tells it: no sensor has the numbers so near zero that f32 holds them with fewer digits.
+fn as_told(value: f64) -> f32 {
+    let told = value as f32;
+    if told.is_subnormal() { 0.0 } else { told }
 }
