@@ -59,7 +59,7 @@ pub fn draw(title: &str, run: &Run) -> anyhow::Result<String> {
         |area| {
             let rows = stack(area, curves.len(), PANEL, "time (s)");
             for ((area, time), (name, curve)) in rows.into_iter().zip(curves) {
-                let curve = extremes(curve.into_iter(), BUCKETS);
+                let curve = extremes(curve, BUCKETS);
                 let panel = Panel::new(
                     &area,
                     ("", ""),
