@@ -25,7 +25,7 @@ const CODE: [Code; 8] = [
     ("SysTick", 0x140, &[RETURN], Some(0)),
     // push {r7, lr}; pop {r7, pc}
     ("DefaultHandler", 0x150, &[0xB580, 0xBD80], Some(8)),
-    ("HardFault", 0x160, &[RETURN], Some(0)),
+    ("end_hard_fault", 0x160, &[RETURN], Some(0)),
     ("NonMaskableInt", 0x170, &[RETURN], Some(0)),
 ];
 const POINTED: u32 = 0x131;
@@ -67,7 +67,7 @@ fn image(code: &[Code], states_frames: bool) -> Vec<u8> {
     for (name, at) in [("$t", 0x100), ("$d", DATA_AT), ("$t", 0x110)] {
         symbol(name, at, SymbolKind::Label, SymbolSection::Section(text));
     }
-    for (name, at) in [("_stack_start", 0x2000_1000), ("__sheap", 0x2000_0800)] {
+    for (name, at) in [("_stack_start", 0x2000_1000), ("_stack_end", 0x2000_0800)] {
         symbol(name, at, SymbolKind::Data, SymbolSection::Absolute);
     }
     if states_frames {
