@@ -123,7 +123,7 @@ pub fn run(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode {
     let tick_s = 1.0 / scenario.run.control_rate_hz;
     let pace = link.pace;
     app::start(period, scenario, tick_s, |pwm| {
-        let pwm = cortex_m::singleton!(: PwmInterrupt = PwmInterrupt {
+        let pwm = place_pwm(PwmInterrupt {
             task: ecu.pwm,
             pwm,
             link,
@@ -131,8 +131,7 @@ pub fn run(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode {
             last_tick_counts: Current::cost_counter(),
             nominal_counts: (Current::COST_CLOCK_HZ as f32 * tick_s) as u32,
         })?;
-        let control =
-            cortex_m::singleton!(: ControlInterrupt = ControlInterrupt { task: ecu.control })?;
+        let control = place_control(ControlInterrupt { task: ecu.control })?;
         Some((
             tasks::PwmInterrupt::InLoop(pwm),
             tasks::ControlInterrupt::InLoop(control),
@@ -155,4 +154,13 @@ pub fn run(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode {
     }
     Current::neutralise_pwm();
     app::conclude(0)
+}
+
+// Functions of their own, so that the two have names in the image: faults are injected there.
+fn place_pwm(interrupt: PwmInterrupt) -> Option<&'static mut PwmInterrupt> {
+    cortex_m::singleton!(: PwmInterrupt = interrupt)
+}
+
+fn place_control(interrupt: ControlInterrupt) -> Option<&'static mut ControlInterrupt> {
+    cortex_m::singleton!(: ControlInterrupt = interrupt)
 }

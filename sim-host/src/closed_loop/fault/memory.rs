@@ -12,8 +12,8 @@ const STACK_BYTES: u32 = 1536;
 /// Data addresses start here on every Cortex-M.
 const RAM_START: u32 = 0x2000_0000;
 /// Variables that belong to the ECU's tasks, by a part of the linker's name.
-const CONTROL_TASK: &str = "PendSV_trampoline9INTERRUPT";
-const PWM_TASK: &str = "SysTick_trampoline9INTERRUPT";
+const CONTROL_TASK: &str = "in_loop13place_control";
+const PWM_TASK: &str = "in_loop9place_pwm";
 const MAILBOXES: [&str; 2] = ["in_loop5INPUT", "in_loop6OUTPUT"];
 
 /// A part of the memory.
@@ -60,11 +60,12 @@ impl Region {
         let is = |part: &str| symbol.name.contains(part);
         let is_mailbox = MAILBOXES.into_iter().any(is);
         let is_variable = !symbol.is_code && symbol.address >= RAM_START;
+        let is_task = is(CONTROL_TASK) || is(PWM_TASK);
         match self {
-            Self::ControlTask => is(CONTROL_TASK),
-            Self::PwmTask => is(PWM_TASK),
+            Self::ControlTask => is_variable && is(CONTROL_TASK),
+            Self::PwmTask => is_variable && is(PWM_TASK),
             Self::Mailboxes => is_mailbox,
-            Self::OtherVariables => is_variable && !is_mailbox && !is("INTERRUPT"),
+            Self::OtherVariables => is_variable && !is_mailbox && !is_task,
             Self::Stack => false,
             Self::Code => ["SysTick", "PendSV"].contains(&symbol.name.as_str()),
         }
