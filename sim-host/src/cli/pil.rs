@@ -98,6 +98,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         link: arguments.link,
         time_out,
     };
+    keep_to_one_core();
     let mut driven = Vec::new();
     for (scenario, manoeuvre) in &manoeuvres {
         let levels =
@@ -120,6 +121,19 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         Done::Failed
     })
 }
+
+/// Host and emulator take turns: on one core a turn costs a switch, on two a wake-up, which can take several times as long.
+#[cfg(target_os = "linux")]
+fn keep_to_one_core() {
+    use rustix::thread::{CpuSet, sched_getcpu, sched_setaffinity};
+    let mut core = CpuSet::new();
+    core.set(sched_getcpu());
+    // Where it is not allowed, the run only takes longer.
+    let _ = sched_setaffinity(None, &core);
+}
+
+#[cfg(not(target_os = "linux"))]
+fn keep_to_one_core() {}
 
 impl Arguments {
     fn manoeuvres(&self) -> anyhow::Result<Vec<(Scenario<f64>, Manoeuvre)>> {
