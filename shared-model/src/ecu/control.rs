@@ -88,6 +88,7 @@ struct Channel<T> {
     measurement: Option<Measurement<T>>,
     controller: Controller<T>,
     supervisor: Supervisor<T>,
+    sender: Sender,
 }
 
 impl<T: Real> Channel<T> {
@@ -125,6 +126,18 @@ impl<T: Real> Channel<T> {
         };
         (setpoint, actuation)
     }
+
+    /// The actuator frame. The safe state judges nothing any more, so a wheel speed limit that memory lost in one channel
+    /// must not be told: it is the lower of both channels'.
+    fn tell(&mut self, told: &Actuation<T>, other: &Actuation<T>) -> (Actuation<T>, FrameBytes) {
+        let limit_rpm = lower(told.wheel_speed_limit_rpm, other.wheel_speed_limit_rpm);
+        let actuation = Actuation {
+            wheel_speed_limit_rpm: limit_rpm,
+            ..*told
+        };
+        let signals = actuation.map(&|signal: T| signal.to_f64() as f32);
+        (actuation, encode_actuation(&signals, &mut self.sender))
+    }
 }
 
 fn warning(status: Status) -> Option<Warning> {
@@ -142,7 +155,7 @@ fn warning(status: Status) -> Option<Warning> {
 #[derive(Debug, Clone)]
 pub struct ControlTask<T> {
     channels: Duplex<Channel<T>>,
-    sender: Sender,
+    frames_differed: bool,
 }
 
 impl<T: Real> ControlTask<T> {
@@ -154,30 +167,25 @@ impl<T: Real> ControlTask<T> {
                 measurement: None,
                 controller: Controller::new(scenario),
                 supervisor: Supervisor::new(scenario, clock_hz),
+                sender: Sender::new(ACTUATOR_DATA_ID),
             }),
-            sender: Sender::new(ACTUATOR_DATA_ID),
+            frames_differed: false,
         }
     }
 
     /// A control tick.
     pub fn run(&mut self, input: &ControlInput) -> ControlOutput<T> {
         let mut found_outside = input.found_by_pwm;
-        found_outside.add_if(!self.channels.agrees(), Fault::ChannelsDiffer);
+        let differ = self.frames_differed || !self.channels.agrees();
+        found_outside.add_if(differ, Fault::ChannelsDiffer);
         let [(setpoint_a, told_a), (setpoint_b, told_b)] = self
             .channels
             .run(|channel| channel.run(input, found_outside));
-        let actuation = Actuation {
-            // The safe state judges nothing any more, so a limit that memory lost in one channel must not be told.
-            wheel_speed_limit_rpm: lower(
-                told_a.wheel_speed_limit_rpm,
-                told_b.wheel_speed_limit_rpm,
-            ),
-            ..told_a
-        };
-        let frame = encode_actuation(
-            &actuation.map(&|signal: T| signal.to_f64() as f32),
-            &mut self.sender,
-        );
+        let pairs = [(told_a, told_b), (told_b, told_a)];
+        let [(actuation, frame), (_, other_frame)] = self
+            .channels
+            .run_each(&pairs, |channel, (own, other)| channel.tell(own, other));
+        self.frames_differed = frame != other_frame;
         ControlOutput {
             setpoints: [setpoint_a, setpoint_b],
             frame,
