@@ -133,6 +133,17 @@ impl<T: Real> CubicTire<T> {
         }
     }
 
+    /// The tyre that a slip angle meets on average under the mean of a dither; a held sample moves the slip angle instead.
+    pub fn averaged(&self, injection: Injection<T>) -> Self {
+        match injection {
+            Injection::Off | Injection::Shift { .. } => *self,
+            Injection::SquareMean { amplitude } => self.softened(amplitude * amplitude),
+            Injection::SineMean { amplitude } => {
+                self.softened(T::from_f64(0.5) * amplitude * amplitude)
+            }
+        }
+    }
+
     /// The tyre that a dithered slip angle meets on average. The mean of the cube under a zero-mean dither of mean square
     /// W^2 (square) or W^2/2 (sine) adds 3 k2 alpha times that to the linear term, so the mean is a cubic tyre again:
     /// (21) gives k1 - 3 k2 W^2, (23) gives k1 - 1.5 k2 W^2.
@@ -195,14 +206,8 @@ impl<T: Real> Tire<T> {
     pub fn force(&self, alpha: T, injection: Injection<T>) -> T {
         match self {
             Self::Cubic(tire) => match injection {
-                Injection::Off => tire.force(alpha),
                 Injection::Shift { offset } => tire.force(alpha + offset),
-                Injection::SquareMean { amplitude } => {
-                    tire.softened(amplitude * amplitude).force(alpha)
-                }
-                Injection::SineMean { amplitude } => tire
-                    .softened(T::from_f64(0.5) * amplitude * amplitude)
-                    .force(alpha),
+                _ => tire.averaged(injection).force(alpha),
             },
             Self::MagicFormula(tire, mean) => match injection {
                 Injection::Off => tire.force(alpha),

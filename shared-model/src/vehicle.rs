@@ -148,7 +148,53 @@ pub struct Model<T> {
     dither_frequency_rad_per_s: T,
 }
 
+/// The numbers in [`Model::derivative`], for whoever evaluates it in another form.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Constants<T> {
+    /// Form of the slip angles.
+    pub slip_form: SlipForm,
+    /// l_f/v, s.
+    pub front_lever_s: T,
+    /// l_r/v, s.
+    pub rear_lever_s: T,
+    /// 1/(m v), s/(kg m).
+    pub lateral_gain: T,
+    /// l_f/I_z, 1/(kg m).
+    pub front_yaw_gain: T,
+    /// l_r/I_z, 1/(kg m).
+    pub rear_yaw_gain: T,
+    /// Torque of the motor about the steering axis, N m.
+    pub motor_torque_nm: T,
+    /// Lever arm of the self-aligning torque, m.
+    pub trail_m: T,
+    /// Viscous damping, N m s/rad.
+    pub damping_nm_s_per_rad: T,
+    /// 1/J_w, 1/(kg m^2).
+    pub inverse_steering_inertia: T,
+}
+
 impl<T: Real> Model<T> {
+    /// The numbers in the derivative beside those of tyres and friction.
+    pub fn constants(&self) -> Constants<T> {
+        Constants {
+            slip_form: self.slip_form,
+            front_lever_s: self.front_lever_s,
+            rear_lever_s: self.rear_lever_s,
+            lateral_gain: self.lateral_gain,
+            front_yaw_gain: self.front_yaw_gain,
+            rear_yaw_gain: self.rear_yaw_gain,
+            motor_torque_nm: self.motor_torque_nm,
+            trail_m: self.trail_m,
+            damping_nm_s_per_rad: self.damping_nm_s_per_rad,
+            inverse_steering_inertia: self.inverse_steering_inertia,
+        }
+    }
+
+    /// The tyres of the front and rear axle.
+    pub fn tires(&self) -> (&Tire<T>, &Tire<T>) {
+        (&self.front, &self.rear)
+    }
+
     /// The model of a scenario, which must be valid.
     pub fn new(scenario: &Scenario<T>) -> Self {
         let (vehicle, steering) = (&scenario.vehicle, &scenario.steering);

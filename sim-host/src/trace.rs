@@ -5,7 +5,7 @@ use shared_model::Real;
 use shared_model::vehicle::State;
 
 /// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
-const BOUND: f64 = 1e3;
+pub(crate) const BOUND: f64 = 1e3;
 
 /// Whether a state vector is one of a vehicle at all: finite, and within any bounds that one could keep.
 pub fn is_bounded<T: Real>(x: &Vector4<T>) -> bool {

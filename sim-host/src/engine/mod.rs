@@ -1,5 +1,7 @@
-//! Arithmetics for analysis: the model evaluated in something else than plain numbers.
+//! Arithmetics and integrators for analysis.
 
 pub mod dual;
+pub mod events;
 pub mod reference;
 pub mod rounding;
+pub mod taylor;

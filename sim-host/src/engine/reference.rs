@@ -7,6 +7,7 @@
 //! compared against it.
 
 use crate::engine::dual::Dual;
+use crate::engine::events::next_mode;
 use nalgebra::Vector4;
 use shared_model::dither::{Application, Injection};
 use shared_model::friction::{FrictionMode, Sign};
@@ -231,26 +232,7 @@ impl Reference {
     fn change_mode(&mut self, instant_s: f64) {
         let (mut x, _) = self.extrapolate(instant_s);
         let from = self.state.friction;
-        let argument = self.model.friction_argument();
-        let sign = self.model.friction_sign(self.injection);
-        let to = match sign.crossing(from, x[argument]) {
-            _ if from == FrictionMode::Sticking => {
-                if self.model.driving_torque_nm(&x, self.injection) > 0.0 {
-                    FrictionMode::Positive
-                } else {
-                    FrictionMode::Negative
-                }
-            }
-            Some((threshold, behind)) => {
-                x[argument] = threshold;
-                if self.model.can_stick(self.injection) {
-                    self.model.mode_at_rest(&x, self.injection)
-                } else {
-                    behind
-                }
-            }
-            None => from,
-        };
+        let to = next_mode(&self.model, self.injection, from, &mut x);
         self.time_s += instant_s;
         self.state = State { x, friction: to };
         self.step_s = LONGEST_STEP_S;

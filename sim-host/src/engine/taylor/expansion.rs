@@ -1,0 +1,318 @@
+//! Taylor coefficients of the motion, many motions side by side.
+//!
+//! With the cubic tyre the right-hand side (14) is a polynomial, so each coefficient follows from those before it by sums of
+//! products (A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99). The dither's means leave the tyres cubic, and dry
+//! friction is a constant torque as long as its mode lasts. `tests` hold the recurrences against the shared model's derivative.
+
+use super::lanes::Lanes;
+use pulp::Simd;
+use shared_model::dither::Injection;
+use shared_model::friction::FrictionMode;
+use shared_model::tire::Tire;
+use shared_model::vehicle::{Model, SIDESLIP, STEERING_ANGLE, STEERING_RATE, SlipForm, YAW_RATE};
+
+/// Order of the expansion.
+pub(super) const ORDER: usize = 12;
+
+/// Coefficients 0 to `ORDER` of one quantity.
+pub(super) type Series<S, const V: usize> = [Lanes<S, V>; ORDER + 1];
+
+/// The numbers of the right-hand side.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct System<L> {
+    front_lever_s: L,
+    rear_lever_s: L,
+    lateral_gain: L,
+    front_yaw_gain: L,
+    rear_yaw_gain: L,
+    front_linear: L,
+    front_cubic: L,
+    rear_linear: L,
+    rear_cubic: L,
+    /// Angular acceleration of the steering by motor and dry friction, by force of the front tyres, and by rate; all 0 where it
+    /// sticks.
+    acceleration: L,
+    acceleration_per_force: L,
+    acceleration_per_rate: L,
+}
+
+impl System<f64> {
+    /// Of a lane without a motion.
+    pub const STILL: Self = Self {
+        front_lever_s: 0.0,
+        rear_lever_s: 0.0,
+        lateral_gain: 0.0,
+        front_yaw_gain: 0.0,
+        rear_yaw_gain: 0.0,
+        front_linear: 0.0,
+        front_cubic: 0.0,
+        rear_linear: 0.0,
+        rear_cubic: 0.0,
+        acceleration: 0.0,
+        acceleration_per_force: 0.0,
+        acceleration_per_rate: 0.0,
+    };
+
+    /// The numbers of a model in a friction mode; `None` if its right-hand side is no polynomial: exact slip angles, the Magic
+    /// Formula, friction under the mean of a sine.
+    pub fn new(model: &Model<f64>, injection: Injection<f64>, mode: FrictionMode) -> Option<Self> {
+        let constants = model.constants();
+        let (Tire::Cubic(front), Tire::Cubic(rear)) = model.tires() else {
+            return None;
+        };
+        let (front, rear) = (front.averaged(injection), rear.averaged(injection));
+        let smooth = matches!(
+            model.friction_sign(injection),
+            shared_model::friction::Sign::Smooth { .. }
+        );
+        if constants.slip_form == SlipForm::Exact || smooth {
+            return None;
+        }
+        let friction_nm = match mode {
+            FrictionMode::Positive => model.friction_limit_nm(),
+            FrictionMode::Negative => -model.friction_limit_nm(),
+            FrictionMode::Neutral | FrictionMode::Sticking => 0.0,
+        };
+        let per_inertia = match mode {
+            FrictionMode::Sticking => 0.0,
+            _ => constants.inverse_steering_inertia,
+        };
+        Some(Self {
+            front_lever_s: constants.front_lever_s,
+            rear_lever_s: -constants.rear_lever_s,
+            lateral_gain: constants.lateral_gain,
+            front_yaw_gain: constants.front_yaw_gain,
+            rear_yaw_gain: -constants.rear_yaw_gain,
+            front_linear: front.linear_n_per_rad,
+            front_cubic: -front.cubic_n_per_rad3,
+            rear_linear: rear.linear_n_per_rad,
+            rear_cubic: -rear.cubic_n_per_rad3,
+            acceleration: (constants.motor_torque_nm - friction_nm) * per_inertia,
+            acceleration_per_force: -constants.trail_m * per_inertia,
+            acceleration_per_rate: -constants.damping_nm_s_per_rad * per_inertia,
+        })
+    }
+}
+
+impl<L> System<L> {
+    fn numbers(&mut self) -> [&mut L; 12] {
+        [
+            &mut self.front_lever_s,
+            &mut self.rear_lever_s,
+            &mut self.lateral_gain,
+            &mut self.front_yaw_gain,
+            &mut self.rear_yaw_gain,
+            &mut self.front_linear,
+            &mut self.front_cubic,
+            &mut self.rear_linear,
+            &mut self.rear_cubic,
+            &mut self.acceleration,
+            &mut self.acceleration_per_force,
+            &mut self.acceleration_per_rate,
+        ]
+    }
+}
+
+impl<S: Simd, const V: usize> System<Lanes<S, V>> {
+    /// No motion in any lane.
+    pub fn still(simd: S) -> Self {
+        let zero = Lanes::splat(simd, 0.0);
+        Self {
+            front_lever_s: zero,
+            rear_lever_s: zero,
+            lateral_gain: zero,
+            front_yaw_gain: zero,
+            rear_yaw_gain: zero,
+            front_linear: zero,
+            front_cubic: zero,
+            rear_linear: zero,
+            rear_cubic: zero,
+            acceleration: zero,
+            acceleration_per_force: zero,
+            acceleration_per_rate: zero,
+        }
+    }
+
+    /// Puts a motion's numbers into its lane.
+    pub fn set_lane(&mut self, lane: usize, mut system: System<f64>) {
+        for (lanes, number) in self.numbers().into_iter().zip(system.numbers()) {
+            lanes.as_mut_slice()[lane] = *number;
+        }
+    }
+}
+
+/// Series of one axle: its slip angle, the tyre's force, and its rate of change with the angle.
+#[derive(Debug, Clone, Copy)]
+struct Axle<S: Simd, const V: usize> {
+    slip_angle: Series<S, V>,
+    /// Force over slip angle.
+    secant: Series<S, V>,
+    force: Series<S, V>,
+    slope: Series<S, V>,
+}
+
+impl<S: Simd, const V: usize> Axle<S, V> {
+    /// Coefficient `n` of force and slope: F = alpha (k1 - k2 alpha^2), dF/dalpha = k1 - 3 k2 alpha^2.
+    #[inline(always)]
+    fn load(&mut self, n: usize, linear: Lanes<S, V>, cubic: Lanes<S, V>, with_slope: bool) {
+        let softening = cubic * square(&self.slip_angle, n);
+        let (secant, slope) = if n == 0 {
+            (linear + softening, linear + softening.scale(3.0))
+        } else {
+            (softening, softening.scale(3.0))
+        };
+        self.secant[n] = secant;
+        if with_slope {
+            self.slope[n] = slope;
+        }
+        self.force[n] = product(&self.secant, &self.slip_angle, n);
+    }
+}
+
+/// Coefficient `n` of the product of two series.
+#[inline(always)]
+fn product<S: Simd, const V: usize>(a: &Series<S, V>, b: &Series<S, V>, n: usize) -> Lanes<S, V> {
+    let mut sum = a[0] * b[n];
+    for j in 1..=n {
+        sum = a[j].mul_add(b[n - j], sum);
+    }
+    sum
+}
+
+/// Coefficient `n` of the square of a series.
+#[inline(always)]
+fn square<S: Simd, const V: usize>(a: &Series<S, V>, n: usize) -> Lanes<S, V> {
+    if n == 0 {
+        return a[0] * a[0];
+    }
+    let mut half = a[0] * a[n];
+    for j in 1..n.div_ceil(2) {
+        half = a[j].mul_add(a[n - j], half);
+    }
+    let twice = half + half;
+    if n % 2 == 0 {
+        a[n / 2].mul_add(a[n / 2], twice)
+    } else {
+        twice
+    }
+}
+
+/// Value at `t` of a series.
+#[inline(always)]
+pub(super) fn value<S: Simd, const V: usize>(series: &Series<S, V>, t: Lanes<S, V>) -> Lanes<S, V> {
+    let mut sum = series[ORDER];
+    for k in (0..ORDER).rev() {
+        sum = sum.mul_add(t, series[k]);
+    }
+    sum
+}
+
+/// The expansion of a tangent vector.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tangent<S: Simd, const V: usize> {
+    /// The vector.
+    pub x: [Series<S, V>; 4],
+    front_slip_angle: Series<S, V>,
+    rear_slip_angle: Series<S, V>,
+}
+
+/// The expansion of the motion about a state, with `K` tangent vectors.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Expansion<S: Simd, const V: usize, const K: usize> {
+    /// The state.
+    pub x: [Series<S, V>; 4],
+    /// The tangent vectors.
+    pub tangents: [Tangent<S, V>; K],
+    front: Axle<S, V>,
+    rear: Axle<S, V>,
+}
+
+impl<S: Simd, const V: usize, const K: usize> Expansion<S, V, K> {
+    /// Room for an expansion.
+    pub fn new(simd: S) -> Self {
+        let zero = [Lanes::splat(simd, 0.0); ORDER + 1];
+        let axle = Axle {
+            slip_angle: zero,
+            secant: zero,
+            force: zero,
+            slope: zero,
+        };
+        let tangent = Tangent {
+            x: [zero; 4],
+            front_slip_angle: zero,
+            rear_slip_angle: zero,
+        };
+        Self {
+            x: [zero; 4],
+            tangents: [tangent; K],
+            front: axle,
+            rear: axle,
+        }
+    }
+
+    /// Series of the front tyres' force, up to the coefficient before the last.
+    pub fn front_force(&self) -> &Series<S, V> {
+        &self.front.force
+    }
+
+    /// Works out all coefficients from those of order 0, which are the state and the tangent vectors.
+    #[inline(always)]
+    pub fn expand(&mut self, system: &System<Lanes<S, V>>) {
+        let (front, rear) = (&mut self.front, &mut self.rear);
+        for n in 0..ORDER {
+            let (front_angle, rear_angle) = slip_angles(system, &self.x, n);
+            front.slip_angle[n] = front_angle;
+            rear.slip_angle[n] = rear_angle;
+            front.load(n, system.front_linear, system.front_cubic, K > 0);
+            rear.load(n, system.rear_linear, system.rear_cubic, K > 0);
+            advance(system, &mut self.x, n, front.force[n], rear.force[n]);
+            if n == 0 {
+                let series = &mut self.x[STEERING_RATE];
+                series[1] = series[1] + system.acceleration;
+            }
+            for k in 0..K {
+                let tangent = &mut self.tangents[k];
+                let (front_angle, rear_angle) = slip_angles(system, &tangent.x, n);
+                tangent.front_slip_angle[n] = front_angle;
+                tangent.rear_slip_angle[n] = rear_angle;
+                let front_force = product(&front.slope, &tangent.front_slip_angle, n);
+                let rear_force = product(&rear.slope, &tangent.rear_slip_angle, n);
+                advance(system, &mut tangent.x, n, front_force, rear_force);
+            }
+        }
+    }
+}
+
+/// Coefficient `n` of the slip angles, front and rear: second lines of (4) and (5).
+#[inline(always)]
+fn slip_angles<S: Simd, const V: usize>(
+    system: &System<Lanes<S, V>>,
+    x: &[Series<S, V>; 4],
+    n: usize,
+) -> (Lanes<S, V>, Lanes<S, V>) {
+    let (beta, gamma, delta) = (x[SIDESLIP][n], x[YAW_RATE][n], x[STEERING_ANGLE][n]);
+    let front = system.front_lever_s.mul_add(gamma, beta - delta);
+    let rear = system.rear_lever_s.mul_add(gamma, beta);
+    (front, rear)
+}
+
+/// Coefficient `n + 1` of a vector by the right-hand side (14), but for its constant.
+#[inline(always)]
+fn advance<S: Simd, const V: usize>(
+    system: &System<Lanes<S, V>>,
+    x: &mut [Series<S, V>; 4],
+    n: usize,
+    front: Lanes<S, V>,
+    rear: Lanes<S, V>,
+) {
+    let (gamma, rate) = (x[YAW_RATE][n], x[STEERING_RATE][n]);
+    let inverse = 1.0 / (n + 1) as f64;
+    let lateral = (front + rear).mul_add(system.lateral_gain, -gamma);
+    let yaw = front.mul_add(system.front_yaw_gain, rear * system.rear_yaw_gain);
+    let braking = rate * system.acceleration_per_rate;
+    let steering = front.mul_add(system.acceleration_per_force, braking);
+    x[SIDESLIP][n + 1] = lateral.scale(inverse);
+    x[YAW_RATE][n + 1] = yaw.scale(inverse);
+    x[STEERING_ANGLE][n + 1] = rate.scale(inverse);
+    x[STEERING_RATE][n + 1] = steering.scale(inverse);
+}

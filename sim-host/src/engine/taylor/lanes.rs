@@ -1,0 +1,175 @@
+//! Numbers of many motions side by side: `V` vectors of one instruction set, each lane another motion.
+//!
+//! Loops instead of closures and iterators here and in the steps: an instruction set reaches only code that is inlined into the
+//! function compiled for it, and a closure need not be.
+
+use pulp::Simd;
+use std::ops::{Add, Mul, Neg, Sub};
+
+/// One number of each motion. All arithmetic is lane by lane and correctly rounded, multiplication with addition fused, so a
+/// lane's bits depend neither on its neighbours nor on the instruction set.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Lanes<S: Simd, const V: usize> {
+    simd: S,
+    vectors: [S::f64s; V],
+}
+
+impl<S: Simd, const V: usize> Lanes<S, V> {
+    /// How many there are.
+    pub const COUNT: usize = V * S::F64_LANES;
+
+    /// The same number in all lanes.
+    #[inline(always)]
+    pub fn splat(simd: S, value: f64) -> Self {
+        let vectors = [simd.splat_f64s(value); V];
+        Self { simd, vectors }
+    }
+
+    /// The lanes as a slice.
+    #[inline(always)]
+    pub fn as_slice(&self) -> &[f64] {
+        bytemuck::cast_slice(&self.vectors)
+    }
+
+    /// The lanes as a slice to write to.
+    #[inline(always)]
+    pub fn as_mut_slice(&mut self) -> &mut [f64] {
+        bytemuck::cast_slice_mut(&mut self.vectors)
+    }
+
+    /// `self * factor + sum`, rounded once.
+    #[inline(always)]
+    pub fn mul_add(self, factor: Self, sum: Self) -> Self {
+        let mut result = sum;
+        for v in 0..V {
+            result.vectors[v] =
+                self.simd
+                    .mul_add_f64s(self.vectors[v], factor.vectors[v], sum.vectors[v]);
+        }
+        result
+    }
+
+    /// Times the same number in all lanes.
+    #[inline(always)]
+    pub fn scale(self, factor: f64) -> Self {
+        let factor = self.simd.splat_f64s(factor);
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.mul_f64s(self.vectors[v], factor);
+        }
+        result
+    }
+
+    /// Absolute value.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.abs_f64s(self.vectors[v]);
+        }
+        result
+    }
+
+    /// Square root.
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.sqrt_f64s(self.vectors[v]);
+        }
+        result
+    }
+
+    /// Quotient.
+    #[inline(always)]
+    pub fn over(self, divisor: Self) -> Self {
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.div_f64s(self.vectors[v], divisor.vectors[v]);
+        }
+        result
+    }
+
+    /// The lesser of two; not a number where `other` is none.
+    #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        self.select_less(other, self, other)
+    }
+
+    /// The greater of two; not a number where `other` is none.
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        other.select_less(self, self, other)
+    }
+
+    /// `yes` where this is less than `bound`, elsewhere `no`.
+    #[inline(always)]
+    pub fn select_less(self, bound: Self, yes: Self, no: Self) -> Self {
+        let mut result = no;
+        for v in 0..V {
+            let simd = self.simd;
+            let less = simd.less_than_f64s(self.vectors[v], bound.vectors[v]);
+            result.vectors[v] = simd.select_f64s(less, yes.vectors[v], no.vectors[v]);
+        }
+        result
+    }
+
+    /// This is less than `bound` in every lane.
+    #[inline(always)]
+    pub fn all_less(self, bound: Self) -> bool {
+        let mut all = true;
+        for v in 0..V {
+            let less = self.simd.less_than_f64s(self.vectors[v], bound.vectors[v]);
+            all &= self.simd.first_true_m64s(self.simd.not_m64s(less)) >= S::F64_LANES;
+        }
+        all
+    }
+}
+
+impl<S: Simd, const V: usize> Add for Lanes<S, V> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.add_f64s(self.vectors[v], other.vectors[v]);
+        }
+        result
+    }
+}
+
+impl<S: Simd, const V: usize> Sub for Lanes<S, V> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.sub_f64s(self.vectors[v], other.vectors[v]);
+        }
+        result
+    }
+}
+
+impl<S: Simd, const V: usize> Mul for Lanes<S, V> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.mul_f64s(self.vectors[v], other.vectors[v]);
+        }
+        result
+    }
+}
+
+impl<S: Simd, const V: usize> Neg for Lanes<S, V> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.neg_f64s(self.vectors[v]);
+        }
+        result
+    }
+}
