@@ -123,7 +123,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 }
 
 /// Host and emulator take turns: on one core a turn costs a switch, on two a wake-up, which can take several times as long.
-#[cfg(target_os = "linux")]
 fn keep_to_one_core() {
     use rustix::thread::{CpuSet, sched_getcpu, sched_setaffinity};
     let mut core = CpuSet::new();
@@ -131,9 +130,6 @@ fn keep_to_one_core() {
     // Where it is not allowed, the run only takes longer.
     let _ = sched_setaffinity(None, &core);
 }
-
-#[cfg(not(target_os = "linux"))]
-fn keep_to_one_core() {}
 
 impl Arguments {
     fn manoeuvres(&self) -> anyhow::Result<Vec<(Scenario<f64>, Manoeuvre)>> {
