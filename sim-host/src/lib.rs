@@ -21,7 +21,9 @@
 //! | how are results shown? | [`report`], [`verdict`] |
 
 #[cfg(not(target_os = "linux"))]
-compile_error!("sim-host needs Linux: it ends the emulator with itself, and keeps both on one core, by Linux's own calls");
+compile_error!(
+    "sim-host needs Linux: it ends the emulator with itself, and keeps both on one core, by Linux's own calls"
+);
 
 pub mod averaging;
 pub mod chaos;
