@@ -366,14 +366,16 @@ mod tests {
     fn half_a_packet_ends_with_the_limit_and_a_closed_link_at_once() {
         let (ours, mut theirs) = std::io::pipe().expect("a pipe can be made");
         let mut ours = File::from(OwnedFd::from(ours));
-        let limit = Duration::from_millis(20);
-        let mut bytes = [0; TO_HOST_LEN];
-        let mut read = |file| read_exact(file, limit, &mut bytes).map_err(|error| error.kind());
+        let mut read = || {
+            let mut bytes = [0; TO_HOST_LEN];
+            read_exact(&mut ours, Duration::from_millis(20), &mut bytes)
+                .map_err(|error| error.kind())
+        };
         theirs.write_all(&[0; TO_HOST_LEN]).expect("it takes them");
-        assert_eq!(read(&mut ours), Ok(()));
+        assert_eq!(read(), Ok(()));
         theirs.write_all(&[0; 2]).expect("it takes them");
-        assert_eq!(read(&mut ours), Err(ErrorKind::TimedOut));
+        assert_eq!(read(), Err(ErrorKind::TimedOut));
         drop(theirs);
-        assert_eq!(read(&mut ours), Err(ErrorKind::UnexpectedEof));
+        assert_eq!(read(), Err(ErrorKind::UnexpectedEof));
     }
 }
