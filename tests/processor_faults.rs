@@ -1,9 +1,6 @@
 //! Faults of the ECU's processor, done to the firmware through the emulator's gdb stub; and faults between vehicle and ECU, which
 //! the firmware takes as the host's program does, bit for bit.
 
-// The emulator is steered over local sockets.
-#![cfg(unix)]
-
 use shared_model::frame::decode_actuation;
 use shared_model::signal::Mode;
 use sim_host::closed_loop::fault::campaign::Row;

@@ -20,6 +20,11 @@
 //! | how are configurations read? | [`config`] |
 //! | how are results shown? | [`report`], [`verdict`] |
 
+#[cfg(not(target_os = "linux"))]
+compile_error!(
+    "sim-host needs Linux: it ends the emulator with itself, and keeps both on one core, by Linux's own calls"
+);
+
 pub mod averaging;
 pub mod chaos;
 pub mod characteristics;

@@ -1,47 +1,21 @@
 //! The command line as a user meets it: bad input gets a clear message with the value and its bounds, exit code 2, and nothing
 //! is lost or overwritten.
 
+mod common;
+
+use common::{assert_ends, assert_refused, command, folder};
 use shared_model::friction::FrictionMode;
 use shared_model::telemetry::{Header, Record, Trailer};
 use shared_model::vehicle::State;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-use tempfile::TempDir;
-
-const SIM_HOST: &str = env!("CARGO_BIN_EXE_sim-host");
-
-fn folder() -> TempDir {
-    tempfile::tempdir().expect("a temporary folder can be made")
-}
-
-fn sim_host(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(SIM_HOST)
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
-}
-
-/// Runs in `folder`, expects exit code 2 and a last line with all of `parts`.
-fn assert_refused(folder: &Path, arguments: &[&str], parts: &[&str]) {
-    let output = sim_host(folder, arguments);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    for part in parts {
-        assert!(
-            message.contains(part),
-            "{arguments:?}: {message} lacks {part:?}"
-        );
-    }
-}
 
 /// As [`assert_refused`], for a configuration file with the given text.
 fn assert_config_refused(toml: &str, parts: &[&str]) {
     let folder = folder();
     fs::write(folder.path().join("c.toml"), toml).expect("the file can be written");
     let arguments = ["simulate", "--config", "c.toml", "--out", "t.csv"];
-    assert_refused(folder.path(), &arguments, parts);
+    assert_refused(folder.path(), arguments, parts);
     assert!(!folder.path().join("t.csv").exists(), "nothing is written");
 }
 
@@ -128,7 +102,7 @@ fn options_are_checked() {
     }
     assert_refused(
         folder.path(),
-        &["simulate", "--config", "none.toml", "--out", "t.csv"],
+        ["simulate", "--config", "none.toml", "--out", "t.csv"],
         &["none.toml"],
     );
 }
@@ -140,7 +114,7 @@ fn a_diverging_motion_is_said_and_not_written() {
                   [tires.rear]\nstiffness_per_rad = 9.0051\nshape = 1.3\npeak_n = 5430.0\n";
     fs::write(folder.path().join("b.toml"), road_b).expect("the file can be written");
     let arguments = ["simulate", "--config", "b.toml", "--out", "t.csv"];
-    assert_refused(folder.path(), &arguments, &["diverges at"]);
+    assert_refused(folder.path(), arguments, &["diverges at"]);
     assert!(!folder.path().join("t.csv").exists(), "nothing is written");
 }
 
@@ -150,10 +124,10 @@ fn outputs_are_not_overwritten_unasked() {
     let out = folder.path().join("t.csv");
     fs::write(&out, "precious").expect("the file can be written");
     let arguments = ["simulate", "--time", "1", "--out", "t.csv"];
-    assert_refused(folder.path(), &arguments, &["t.csv exists", "--force"]);
+    assert_refused(folder.path(), arguments, &["t.csv exists", "--force"]);
     assert_eq!(fs::read_to_string(&out).expect("it is there"), "precious");
     let forced = ["simulate", "--time", "1", "--out", "t.csv", "--force"];
-    assert_eq!(sim_host(folder.path(), &forced).status.code(), Some(0));
+    assert_ends(&mut command(folder.path(), forced), 0);
     let csv = fs::read_to_string(&out).expect("it is there");
     assert!(csv.starts_with("time_s,sideslip_rad,yaw_rate_rad_per_s,"));
     assert_eq!(csv.lines().count(), 1001);
@@ -161,7 +135,7 @@ fn outputs_are_not_overwritten_unasked() {
     for out in ["missing/t.csv", "t.csv/u.csv"] {
         assert_refused(
             folder.path(),
-            &["simulate", "--time", "1", "--out", out],
+            ["simulate", "--time", "1", "--out", out],
             &["cannot write into"],
         );
     }
@@ -171,10 +145,15 @@ fn outputs_are_not_overwritten_unasked() {
 fn configurations_are_complete_and_read_back() {
     let folder = folder();
     for preset in ["reconstruction", "printed"] {
-        let printed = sim_host(folder.path(), &["config", "--preset", preset]);
-        assert_eq!(printed.status.code(), Some(0));
+        let printed = assert_ends(
+            &mut command(folder.path(), ["config", "--preset", preset]),
+            0,
+        );
         fs::write(folder.path().join("c.toml"), &printed.stdout).expect("the file can be written");
-        let again = sim_host(folder.path(), &["config", "--config", "c.toml"]);
+        let again = assert_ends(
+            &mut command(folder.path(), ["config", "--config", "c.toml"]),
+            0,
+        );
         assert_eq!(again.stdout, printed.stdout);
     }
 }
@@ -182,12 +161,11 @@ fn configurations_are_complete_and_read_back() {
 #[test]
 fn help_has_examples() {
     let folder = folder();
-    for command in ["verify", "simulate", "config", "decode", "qemu"] {
-        let help = sim_host(folder.path(), &[command, "--help"]);
-        assert_eq!(help.status.code(), Some(0));
+    for name in ["verify", "simulate", "config", "decode", "qemu"] {
+        let help = assert_ends(&mut command(folder.path(), [name, "--help"]), 0);
         let text = String::from_utf8_lossy(&help.stdout);
         assert!(
-            text.contains("Example") && text.contains(&format!("sim-host {command}")),
+            text.contains("Example") && text.contains(&format!("sim-host {name}")),
             "{text}"
         );
     }
@@ -202,14 +180,14 @@ fn images_are_checked() {
         let with = |image| [command, &[image]].concat();
         assert_refused(
             folder.path(),
-            &with("missing"),
+            with("missing"),
             &["missing", "cargo xtask firmware"],
         );
-        assert_refused(folder.path(), &with("text"), &["text is not an ELF file"]);
+        assert_refused(folder.path(), with("text"), &["text is not an ELF file"]);
         // This program itself: an ELF for another machine.
         assert_refused(
             folder.path(),
-            &with(SIM_HOST),
+            with(env!("CARGO_BIN_EXE_sim-host")),
             &["not for a 32-bit Arm Cortex-M"],
         );
     }
@@ -233,14 +211,9 @@ fn arm_elf(folder: &Path) -> PathBuf {
 fn a_missing_emulator_is_said() {
     let folder = folder();
     let image = arm_elf(folder.path());
-    let output = Command::new(SIM_HOST)
-        .arg("qemu")
-        .arg(image)
-        .env("PATH", folder.path())
-        .output()
-        .expect("the program starts");
+    let mut command = command(folder.path(), ["qemu"]);
+    let output = assert_ends(command.arg(image).env("PATH", folder.path()), 2);
     let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(
         message.contains("qemu-system-arm is not installed"),
         "{message}"
@@ -326,7 +299,7 @@ fn damaged_telemetry_is_refused() {
         fs::write(&path, &whole[..length]).expect("the file can be written");
         assert_refused(
             folder.path(),
-            &decode,
+            decode,
             &["telemetry is damaged", "cut short"],
         );
     }
@@ -334,13 +307,13 @@ fn damaged_telemetry_is_refused() {
         let mut flipped = whole.clone();
         flipped[byte] ^= 0x10;
         fs::write(&path, flipped).expect("the file can be written");
-        assert_refused(folder.path(), &decode, &["telemetry is"]);
+        assert_refused(folder.path(), decode, &["telemetry is"]);
     }
     assert!(!folder.path().join("t.csv").exists(), "nothing is written");
-    assert_refused(folder.path(), &["decode", "none.bin"], &["none.bin"]);
+    assert_refused(folder.path(), ["decode", "none.bin"], &["none.bin"]);
 
     fs::write(&path, &whole).expect("the file can be written");
-    assert_eq!(sim_host(folder.path(), &decode).status.code(), Some(0));
+    assert_ends(&mut command(folder.path(), decode), 0);
     let csv = fs::read_to_string(folder.path().join("t.csv")).expect("it is there");
     assert_eq!(csv.lines().count(), 4);
     assert!(

@@ -1,19 +1,13 @@
 //! `sim-host convergence`, `sim-host averaging` and `sim-host reproduce` on the command line.
 
-use std::path::Path;
-use std::process::{Command, Output};
+mod common;
 
-fn sim_host(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sim-host"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
-}
+use common::{assert_ends, assert_refused, command, folder};
+use std::path::Path;
 
 #[test]
 fn bad_input_is_refused() {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let folder = folder();
     std::fs::write(folder.path().join("file"), "precious").expect("the file can be written");
     let cases: [(&[&str], &[&str]); 9] = [
         (&["convergence", "--time", "0"], &["duration_s = 0"]),
@@ -74,15 +68,7 @@ fn bad_input_is_refused() {
         ),
     ];
     for (arguments, parts) in cases {
-        let output = sim_host(folder.path(), arguments);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-        for part in parts {
-            assert!(
-                message.contains(part),
-                "{arguments:?}: {message} lacks {part:?}"
-            );
-        }
+        assert_refused(folder.path(), arguments, parts);
     }
     let kept = std::fs::read_to_string(folder.path().join("file")).expect("it is there");
     assert_eq!(kept, "precious");
@@ -90,7 +76,7 @@ fn bad_input_is_refused() {
 
 #[test]
 fn results_are_written() {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let folder = folder();
     let averaging = [
         "averaging",
         "--dither",
@@ -116,13 +102,7 @@ fn results_are_written() {
         "c.svg",
     ];
     for arguments in [averaging.as_slice(), &convergence] {
-        let output = sim_host(folder.path(), arguments);
-        assert_eq!(
-            output.status.code(),
-            Some(0),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
+        assert_ends(&mut command(folder.path(), arguments), 0);
     }
     let read = |name: &str| std::fs::read_to_string(folder.path().join(name)).expect("it is there");
     assert!(read("a.csv").starts_with("frequency_rad_per_s,period,averaged_period,"));
@@ -135,7 +115,7 @@ fn results_are_written() {
 /// Each of the examples is a configuration that subcommands take, and what differs from the paper is said.
 #[test]
 fn the_examples_run() {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let folder = folder();
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
     for (name, differs) in [
         ("paper", "the paper's"),
@@ -144,7 +124,7 @@ fn the_examples_run() {
     ] {
         let file = examples.join(format!("{name}.toml"));
         let file = file.to_str().expect("the path is text");
-        for command in [
+        for analysis in [
             ["simulate", "--time", "5", "--out"].as_slice(),
             &["lyapunov", "--rpm", "1750", "--time", "400", "--out"],
             &[
@@ -152,26 +132,20 @@ fn the_examples_run() {
             ],
             &["tires", "--out"],
         ] {
-            let out = format!("{name}-{}.csv", command[0]);
-            let arguments = [command, &[out.as_str(), "--config", file]].concat();
-            let output = sim_host(folder.path(), &arguments);
+            let out = format!("{name}-{}.csv", analysis[0]);
+            let arguments = [analysis, &[out.as_str(), "--config", file]].concat();
+            let output = assert_ends(&mut command(folder.path(), arguments), 0);
             let message = String::from_utf8_lossy(&output.stderr);
-            assert_eq!(
-                output.status.code(),
-                Some(0),
-                "{name} {}: {message}",
-                command[0]
-            );
             assert!(
                 message.contains(differs),
                 "{name} {}: {message}",
-                command[0]
+                analysis[0]
             );
             let csv = std::fs::read_to_string(folder.path().join(out)).expect("it is there");
             assert!(
                 csv.lines().count() > 1 && !csv.contains("NaN"),
                 "{name} {}",
-                command[0]
+                analysis[0]
             );
         }
     }

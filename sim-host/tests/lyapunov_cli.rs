@@ -1,30 +1,15 @@
 //! `sim-host lyapunov` as a user meets it.
 
+mod common;
+
+use common::{assert_ends, assert_refused, folder};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 use std::time::Duration;
-use tempfile::TempDir;
 
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_sim-host"));
-    command
-        .arg("lyapunov")
-        .args(arguments)
-        .current_dir(folder)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped());
-    command
-}
-
-fn lyapunov(folder: &Path, arguments: &[&str]) -> Output {
-    command(folder, arguments)
-        .output()
-        .expect("the program starts")
-}
-
-fn folder() -> TempDir {
-    tempfile::tempdir().expect("a temporary folder can be made")
+fn lyapunov(folder: &Path, arguments: &[&str]) -> Command {
+    common::command(folder, [&["lyapunov"], arguments].concat())
 }
 
 fn text(bytes: &[u8]) -> &str {
@@ -87,15 +72,8 @@ fn bad_input_is_refused_with_values_and_bounds() {
         (&["--tolerance", "0"], &["tolerance of 0 1/s"]),
     ];
     for (arguments, parts) in cases {
-        let output = lyapunov(folder.path(), &[arguments, &["--out", "x.csv"]].concat());
-        let message = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-        for part in parts {
-            assert!(
-                message.contains(part),
-                "{arguments:?}: {message} lacks {part:?}"
-            );
-        }
+        let all = [&["lyapunov", "--out", "x.csv"], arguments].concat();
+        assert_refused(folder.path(), all, parts);
         assert!(!folder.path().join("x.csv").exists(), "{arguments:?}");
     }
 }
@@ -112,11 +90,8 @@ fn results_do_not_depend_on_the_number_of_threads() {
         let [csv, json, svg] = [0, 1, 2].map(|k| names[k].as_str());
         let outputs = ["--out", csv, "--json", json, "--figure", svg];
         let all = [&RANGE[..], &["--method", "all", "--spectrum"], &outputs].concat();
-        let output = command(folder.path(), &all)
-            .env("RAYON_NUM_THREADS", threads)
-            .output()
-            .expect("the program starts");
-        assert!(output.status.success(), "{}", text(&output.stderr));
+        let mut command = lyapunov(folder.path(), &all);
+        assert_ends(command.env("RAYON_NUM_THREADS", threads), 0);
         names.map(|name| fs::read_to_string(folder.path().join(name)).expect("it is written"))
     });
     assert!(files[0] == files[1] && files[0] == files[2]);
@@ -135,13 +110,12 @@ fn existing_files_are_kept_unless_forced() {
     let folder = folder();
     fs::write(folder.path().join("x.csv"), "mine").expect("the file can be written");
     let arguments = ["--rpm", "1600", "--time", "300", "--out", "x.csv"];
-    let output = lyapunov(folder.path(), &arguments);
-    assert_eq!(output.status.code(), Some(2));
+    let mut unforced = lyapunov(folder.path(), &arguments);
+    let output = assert_ends(&mut unforced, 2);
     assert!(text(&output.stderr).contains("--force"));
     let path = folder.path().join("x.csv");
     assert_eq!(fs::read_to_string(&path).expect("it is there"), "mine");
-    let output = lyapunov(folder.path(), &[&arguments[..], &["--force"]].concat());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    assert_ends(unforced.arg("--force"), 0);
     assert_eq!(column(&path, "finding"), ["zero"]);
 }
 
@@ -157,8 +131,8 @@ fn diverging_motions_are_named() {
     .expect("the file can be written");
     let arguments = ["--config", "road.toml", "--method", "all", "--spectrum"];
     let outputs = ["--out", "x.csv", "--figure", "x.svg"];
-    let output = lyapunov(folder.path(), &[&arguments[..], &outputs].concat());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    let mut command = lyapunov(folder.path(), &[&arguments[..], &outputs].concat());
+    let output = assert_ends(&mut command, 0);
     let path = folder.path().join("x.csv");
     assert_eq!(column(&path, "finding"), ["diverges"; 3]);
     assert_eq!(column(&path, "exponent_per_s"), [""; 3]);
@@ -185,8 +159,8 @@ fn a_search_without_result_is_untested_and_names_its_interval() {
         "--out",
         "x.csv",
     ];
-    let output = lyapunov(folder.path(), &[&arguments[..], &search].concat());
-    assert!(output.status.success(), "{}", text(&output.stderr));
+    let mut command = lyapunov(folder.path(), &[&arguments[..], &search].concat());
+    assert_ends(&mut command, 0);
     let path = folder.path().join("x.csv");
     assert_eq!(column(&path, "finding"), ["untested"]);
     let reason = "untested: no coupling from -1 to 0.01 1/s synchronises";
@@ -200,7 +174,9 @@ fn stopping_keeps_what_is_done() {
         "--from", "1500", "--to", "1999", "--step", "1", "--time", "1200",
     ];
     let outputs = ["--out", "x.csv", "--json", "x.json"];
-    let child = command(folder.path(), &[&range[..], &outputs].concat())
+    let child = lyapunov(folder.path(), &[&range[..], &outputs].concat())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
     std::thread::sleep(Duration::from_secs(2));

@@ -7,7 +7,6 @@ use shared_model::{Preset, Scenario, integrate};
 use sim_host::chaos::period::{Period, RIPPLE_TOLERANCE, period};
 use sim_host::closed_loop::manoeuvre::{Manoeuvre, load};
 use sim_host::closed_loop::plant::Plant;
-use sim_host::closed_loop::record::write_csv;
 use sim_host::closed_loop::sensor::{SensorSettings, Sensors};
 use sim_host::closed_loop::servo_filter::{Separation, ServoFilter};
 use sim_host::simulate::{settle, simulate, started_at};
@@ -378,9 +377,11 @@ fn records_are_columns() {
     let neutral = plant.pwm().neutral();
     let start = plant.record();
     plant.step(neutral);
-    let mut csv = Vec::new();
-    write_csv(&[start, plant.record()], &mut csv).expect("written");
-    let lines: Vec<String> = String::from_utf8(csv)
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for record in [start, plant.record()] {
+        csv.serialize(record).expect("a buffer takes it");
+    }
+    let lines: Vec<String> = String::from_utf8(csv.into_inner().expect("a buffer takes it"))
         .expect("text")
         .lines()
         .map(String::from)

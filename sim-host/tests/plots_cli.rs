@@ -1,13 +1,12 @@
 //! The subcommands that plot, as a user meets them: files with named columns and units, and bad input refused with value and
 //! bounds, exit code 2, nothing written.
 
+mod common;
+
+use common::{assert_ends, command, folder};
 use serde_json::Value;
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
-use tempfile::TempDir;
 
-const SIM_HOST: &str = env!("CARGO_BIN_EXE_sim-host");
 const COMMANDS: [&str; 6] = [
     "phase",
     "poincare",
@@ -16,18 +15,6 @@ const COMMANDS: [&str; 6] = [
     "nonlinearity",
     "realisability",
 ];
-
-fn folder() -> TempDir {
-    tempfile::tempdir().expect("a temporary folder can be made")
-}
-
-fn sim_host(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(SIM_HOST)
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
-}
 
 /// What a command wrote: columns and rows of its CSV, its JSON, its figure.
 struct Written {
@@ -51,9 +38,7 @@ fn written(arguments: &[&str]) -> Written {
     let folder = folder();
     let mut all = arguments.to_vec();
     all.extend(["--out", "a.csv", "--json", "a.json", "--figure", "a.svg"]);
-    let output = sim_host(folder.path(), &all);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {message}");
+    let output = assert_ends(&mut command(folder.path(), &all), 0);
     assert!(!output.stdout.is_empty(), "{arguments:?}");
     let read = |name| fs::read_to_string(folder.path().join(name)).expect("it was written");
     let csv = read("a.csv");
@@ -65,9 +50,9 @@ fn written(arguments: &[&str]) -> Written {
     assert!(figure.starts_with("<svg") && !figure.contains("no data"));
     assert!(!csv.contains("NaN") && !figure.contains("NaN"));
     // Nothing is overwritten unasked.
-    assert_eq!(sim_host(folder.path(), &all).status.code(), Some(2));
+    assert_ends(&mut command(folder.path(), &all), 2);
     all.push("--force");
-    assert_eq!(sim_host(folder.path(), &all).status.code(), Some(0));
+    assert_ends(&mut command(folder.path(), &all), 0);
     assert_eq!(read("a.csv"), csv, "the same input gives the same bytes");
     Written {
         columns: lines.next().expect("a header"),
@@ -82,15 +67,7 @@ fn assert_refused(arguments: &[&str], parts: &[&str]) {
     let folder = folder();
     let mut all = arguments.to_vec();
     all.extend(["--out", "a.csv", "--json", "a.json", "--figure", "a.svg"]);
-    let output = sim_host(folder.path(), &all);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-    for part in parts {
-        assert!(
-            message.contains(part),
-            "{arguments:?}: {message} lacks {part:?}"
-        );
-    }
+    common::assert_refused(folder.path(), all, parts);
     let files = fs::read_dir(folder.path()).expect("the folder is there");
     assert_eq!(files.count(), 0, "{arguments:?} wrote something");
 }
@@ -98,10 +75,10 @@ fn assert_refused(arguments: &[&str], parts: &[&str]) {
 #[test]
 fn help_has_examples() {
     let folder = folder();
-    for command in COMMANDS {
-        let help = sim_host(folder.path(), &[command, "--help"]);
+    for name in COMMANDS {
+        let help = assert_ends(&mut command(folder.path(), [name, "--help"]), 0);
         let text = String::from_utf8_lossy(&help.stdout);
-        let example = format!("sim-host {command}");
+        let example = format!("sim-host {name}");
         assert!(
             text.contains("Example") && text.contains(&example),
             "{text}"

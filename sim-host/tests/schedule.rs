@@ -1,5 +1,8 @@
 //! The dither's schedule: the ECU's table against the analysis, the number of threads, and bad input.
 
+mod common;
+
+use common::{assert_ends, assert_refused, command, folder};
 use shared_model::dither::Waveform;
 use shared_model::schedule::Schedule;
 use shared_model::schedule_table::{POINTS, SINE, SQUARE};
@@ -9,7 +12,6 @@ use sim_host::schedule::choose::Choice;
 use sim_host::schedule::{Analysis, Plan, schedule};
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 use std::sync::atomic::AtomicBool;
 
 /// The plan behind the ECU's table, at fewer speeds.
@@ -75,28 +77,18 @@ fn no_dither_where_none_is_needed_and_none_where_none_helps() {
     assert_eq!(weak.failed_checks().count(), 1);
 }
 
-fn sim_host(folder: &Path, threads: &str, line: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sim-host"))
-        .args(line.split_whitespace())
-        .env("RAYON_NUM_THREADS", threads)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
-}
-
 const FILES: [&str; 4] = ["o.rs", "o.csv", "o.json", "o.svg"];
 const TO_FILES: &str = "--out o.rs --csv o.csv --json o.json --figure o.svg --force";
 
 #[test]
 fn the_number_of_threads_does_not_change_the_bytes() {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let folder = folder();
     let made = ["1", "3"].map(|threads| {
         let line = format!(
             "schedule --from 1700 --to 1750 --step 50 --amplitudes 10 --transient 40 --time 70 {TO_FILES}"
         );
-        let output = sim_host(folder.path(), threads, &line);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(0), "{message}");
+        let mut command = command(folder.path(), line.split_whitespace());
+        assert_ends(command.env("RAYON_NUM_THREADS", threads), 0);
         FILES.map(|name| fs::read_to_string(folder.path().join(name)).expect("written"))
     });
     assert_eq!(made[0], made[1]);
@@ -110,12 +102,11 @@ fn the_number_of_threads_does_not_change_the_bytes() {
 /// Exit code 1, and the table says so: an amplitude range that ends too low has no period one.
 #[test]
 fn a_speed_that_nothing_calms_fails() {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let folder = folder();
     let line = format!(
         "schedule --from 1750 --to 1750 --square-to 0.02 --sine-to 0.2 --amplitudes 2 --transient 20 --time 60 {TO_FILES}"
     );
-    let output = sim_host(folder.path(), "2", &line);
-    assert_eq!(output.status.code(), Some(1), "{output:?}");
+    let output = assert_ends(&mut command(folder.path(), line.split_whitespace()), 1);
     let shown = String::from_utf8_lossy(&output.stdout);
     assert!(shown.contains("FAILED at 1750 rpm"), "{shown}");
     let table = fs::read_to_string(folder.path().join("o.rs")).expect("written");
@@ -138,14 +129,9 @@ fn bad_input_is_refused_and_nothing_is_written() {
         ("--amplitudes 1", &["--amplitudes"]),
         ("--transient 200", &["transient of 200 s", "shorter"]),
     ] {
-        let folder = tempfile::tempdir().expect("a temporary folder can be made");
+        let folder = folder();
         let line = format!("schedule {rest} {TO_FILES}");
-        let output = sim_host(folder.path(), "2", &line);
-        let message = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(2), "{line}: {message}");
-        for part in parts {
-            assert!(message.contains(part), "{line}: {message} lacks {part:?}");
-        }
+        assert_refused(folder.path(), line.split_whitespace(), parts);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "{line}");
     }
 }
@@ -154,9 +140,9 @@ fn bad_input_is_refused_and_nothing_is_written() {
 #[test]
 #[ignore = "makes the whole table"]
 fn the_whole_table_is_made_again_byte_for_byte() {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    let output = sim_host(folder.path(), "2", "schedule --out table.rs");
-    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let folder = folder();
+    let arguments = ["schedule", "--out", "table.rs"];
+    assert_ends(&mut command(folder.path(), arguments), 0);
     let made = fs::read_to_string(folder.path().join("table.rs")).expect("written");
     let committed =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared-model/src/schedule_table.rs");

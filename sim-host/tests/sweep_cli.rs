@@ -1,27 +1,15 @@
 //! The subcommands that sweep, as a user meets them: bad input, the same bytes for any number of threads, no NaN.
 
-use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+mod common;
 
-fn sim_host(folder: &Path, threads: &str, line: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sim-host"))
-        .args(line.split_whitespace())
-        .env("RAYON_NUM_THREADS", threads)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
-}
+use common::{assert_ends, command, folder};
+use std::fs;
 
 /// Expects exit code 2, a message with all of `parts`, and no file.
 fn assert_refused(line: &str, parts: &[&str]) {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    let output = sim_host(folder.path(), "2", &format!("{line} --out o.csv"));
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{line}: {message}");
-    for part in parts {
-        assert!(message.contains(part), "{line}: {message} lacks {part:?}");
-    }
+    let folder = folder();
+    let arguments = line.split_whitespace().chain(["--out", "o.csv"]);
+    common::assert_refused(folder.path(), arguments, parts);
     assert!(!folder.path().join("o.csv").exists(), "{line}");
 }
 
@@ -97,8 +85,8 @@ fn a_section_that_is_never_crossed_is_said_with_the_motions_bounds() {
 /// Every command, with one thread and with three.
 #[test]
 fn the_number_of_threads_does_not_change_the_bytes() {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    for (k, command) in [
+    let folder = folder();
+    for (k, analysis) in [
         "orbit --from 1600 --to 1700 --step 10 --transient 20 --time 60",
         "orbit --from 1600 --to 1640 --step 10 --transient 20 --time 60 --start down",
         "regions --from 1600 --to 1660 --step 20 --width 5 --transient 20 --time 100",
@@ -110,35 +98,34 @@ fn the_number_of_threads_does_not_change_the_bytes() {
     {
         let files = ["1", "3"].map(|threads| {
             let name = format!("{k}-{threads}");
-            let line = format!("{command} --out {name}.csv --json {name}.json --figure {name}.svg");
-            let output = sim_host(folder.path(), threads, &line);
-            let message = String::from_utf8_lossy(&output.stderr);
-            assert_eq!(output.status.code(), Some(0), "{command}: {message}");
+            let line =
+                format!("{analysis} --out {name}.csv --json {name}.json --figure {name}.svg");
+            let mut command = command(folder.path(), line.split_whitespace());
+            assert_ends(command.env("RAYON_NUM_THREADS", threads), 0);
             ["csv", "json", "svg"].map(|kind| {
                 fs::read_to_string(folder.path().join(format!("{name}.{kind}"))).expect("written")
             })
         });
-        assert_eq!(files[0], files[1], "{command}");
+        assert_eq!(files[0], files[1], "{analysis}");
         let [csv, json, _] = &files[0];
         assert!(csv.lines().count() > 2, "{csv}");
-        assert!(!csv.contains("NaN") && !csv.contains("inf"), "{command}");
+        assert!(!csv.contains("NaN") && !csv.contains("inf"), "{analysis}");
         serde_json::from_str::<serde_json::Value>(json).expect("JSON");
     }
 }
 
 #[test]
 fn diverging_motions_are_named_and_have_no_numbers() {
-    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let folder = folder();
     let start = "[run]\nsideslip_rad = 8\nsteering_angle_rad = -8\n";
     fs::write(folder.path().join("far.toml"), start).expect("the file can be written");
-    for command in ["orbit", "regions"] {
+    for analysis in ["orbit", "regions"] {
         let line = format!(
-            "{command} --config far.toml --from 1750 --to 1750 --transient 5 --time 10 --out {command}.csv --figure f.svg --force"
+            "{analysis} --config far.toml --from 1750 --to 1750 --transient 5 --time 10 --out {analysis}.csv --figure f.svg --force"
         );
-        let output = sim_host(folder.path(), "2", &line);
-        assert_eq!(output.status.code(), Some(0), "{command}: {output:?}");
+        assert_ends(&mut command(folder.path(), line.split_whitespace()), 0);
         let csv =
-            fs::read_to_string(folder.path().join(format!("{command}.csv"))).expect("written");
+            fs::read_to_string(folder.path().join(format!("{analysis}.csv"))).expect("written");
         assert!(csv.contains("diverges"), "{csv}");
         assert!(!csv.contains("NaN") && !csv.contains("inf"), "{csv}");
     }

@@ -274,6 +274,21 @@ mod tests {
         }
     }
 
+    /// A flip may strike what a frame is made of and leave both channels equal, so it is the frames that tell.
+    #[test]
+    fn frames_that_differ_are_found_in_the_next_tick() {
+        for channel in [0, 1] {
+            let mut task = damaged(channel, |one| one.sender = Sender::new(SENSOR_DATA_ID));
+            task.run(&ControlInput::NOTHING);
+            assert!(task.frames_differed);
+        }
+        let mut task = ControlTask::<f32>::new(&Scenario::reconstruction(), CLOCK_HZ);
+        task.run(&ControlInput::NOTHING);
+        assert!(!task.frames_differed);
+        task.frames_differed = true;
+        assert_found(task, "frame", 0);
+    }
+
     #[test]
     fn a_lower_speed_limit_of_one_channel_is_told() {
         for channel in [0, 1] {

@@ -93,7 +93,6 @@ fn on_host(quick: bool) -> anyhow::Result<Vec<Row>> {
     Ok(rows?)
 }
 
-#[cfg(unix)]
 mod processor {
     use super::{FLIPS, QUICK_FLIPS, progress};
     use rayon::prelude::*;
@@ -139,20 +138,6 @@ mod processor {
         let rows: Result<Vec<_>, _> = events.chain(flips).collect();
         progress.finish_and_clear();
         Ok(rows?)
-    }
-}
-
-#[cfg(not(unix))]
-mod processor {
-    use sim_host::closed_loop::fault::campaign::Row;
-
-    /// The emulator is steered over local sockets, which only Unix has.
-    pub fn inject(
-        _: &std::path::Path,
-        _: bool,
-        _: std::time::Duration,
-    ) -> anyhow::Result<Vec<Row>> {
-        anyhow::bail!("--firmware: faults of memory and core need a Unix")
     }
 }
 

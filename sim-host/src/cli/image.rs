@@ -1,11 +1,10 @@
 //! `sim-host image`: what a firmware image needs of its board, and how deep its stack can get.
 
 use super::Done;
-use super::output::Output;
+use super::output::write_json;
 use serde::Serialize;
 use sim_host::image::stack::{Level, Stack};
 use sim_host::pil::elf::Image;
-use std::io::Write;
 use std::path::PathBuf;
 
 /// Show an image's size and its worst stack with the calls that lead there, read from the machine code.
@@ -48,13 +47,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             ram_bytes: image.ram_bytes,
             stack: &stack,
         };
-        let mut output = Output::create(path, arguments.force)?;
-        writeln!(
-            output.writer(),
-            "{}",
-            serde_json::to_string_pretty(&results)?
-        )?;
-        output.finish()?;
+        write_json(path, &results, arguments.force)?;
     }
     Ok(if stack.fits() {
         Done::Well

@@ -16,6 +16,15 @@ pub fn check_free(path: &Path, force: bool) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The same of all outputs that were asked for.
+pub fn check_all_free<'a>(
+    files: impl IntoIterator<Item = &'a Option<PathBuf>>,
+    force: bool,
+) -> anyhow::Result<()> {
+    let mut paths = files.into_iter().flatten();
+    paths.try_for_each(|path| check_free(path, force))
+}
+
 /// A file that takes its name only when it is complete.
 pub struct Output<'a> {
     path: &'a Path,
@@ -59,6 +68,38 @@ fn temporary(folder: &Path) -> std::io::Result<NamedTempFile<File>> {
         .tempfile_in(folder)
 }
 
+/// Writes a text.
+pub fn write_text(path: &Path, text: &str, force: bool) -> anyhow::Result<()> {
+    let mut output = Output::create(path, force)?;
+    output.writer().write_all(text.as_bytes())?;
+    output.finish()
+}
+
+/// Writes results as JSON.
+pub fn write_json(path: &Path, results: &impl Serialize, force: bool) -> anyhow::Result<()> {
+    write_text(
+        path,
+        &(serde_json::to_string_pretty(results)? + "\n"),
+        force,
+    )
+}
+
+/// Writes rows as CSV, the columns named as their fields are.
+pub fn write_rows(
+    path: &Path,
+    rows: impl IntoIterator<Item = impl Serialize>,
+    force: bool,
+) -> anyhow::Result<()> {
+    let mut output = Output::create(path, force)?;
+    let mut csv = csv::Writer::from_writer(output.writer());
+    for row in rows {
+        csv.serialize(row)?;
+    }
+    csv.flush()?;
+    drop(csv);
+    output.finish()
+}
+
 /// Where an analysis writes its results. Without any, a summary is all there is.
 #[derive(Args)]
 pub struct Destinations {
@@ -79,11 +120,7 @@ pub struct Destinations {
 impl Destinations {
     /// Refuses files that are there already, before any work is done for them.
     pub fn check_free(&self) -> anyhow::Result<()> {
-        let files = [&self.out, &self.json, &self.figure];
-        files
-            .into_iter()
-            .flatten()
-            .try_for_each(|path| check_free(path, self.force))
+        check_all_free([&self.out, &self.json, &self.figure], self.force)
     }
 
     /// Writes the rows as CSV, all results as JSON, and the figure: each if it was asked for.
@@ -94,27 +131,14 @@ impl Destinations {
         draw: impl FnOnce() -> anyhow::Result<String>,
     ) -> anyhow::Result<()> {
         if let Some(path) = &self.out {
-            let mut output = Output::create(path, self.force)?;
-            let mut csv = csv::Writer::from_writer(output.writer());
-            for row in rows {
-                csv.serialize(row)?;
-            }
-            csv.flush()?;
-            drop(csv);
-            output.finish()?;
+            write_rows(path, rows, self.force)?;
         }
         if let Some(path) = &self.json {
-            self.text(path, &(serde_json::to_string_pretty(results)? + "\n"))?;
+            write_json(path, results, self.force)?;
         }
         if let Some(path) = &self.figure {
-            self.text(path, &draw()?)?;
+            write_text(path, &draw()?, self.force)?;
         }
         Ok(())
-    }
-
-    fn text(&self, path: &Path, text: &str) -> anyhow::Result<()> {
-        let mut output = Output::create(path, self.force)?;
-        output.writer().write_all(text.as_bytes())?;
-        output.finish()
     }
 }

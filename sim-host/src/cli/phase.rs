@@ -5,7 +5,7 @@ use super::output::Destinations;
 use super::settled::{SettledRun, title};
 use serde::Serialize;
 use sim_host::component::Component;
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::report::chart::{Chart, Look, Panel};
 
 /// Phase portrait of the settled motion: one component of the state against another.
 #[derive(clap::Args)]
@@ -79,21 +79,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         states: &rows,
     };
     arguments.destinations.write(&rows, &results, || {
-        let states = trace.states.iter();
-        let series = Series {
-            label: String::new(),
-            points: states.map(|s| (s.x[x.index], s.x[y.index])).collect(),
-            look: Look::Line(0),
-        };
-        let panel = Panel {
-            x: AxisSpec::linear(x.label()),
-            y: AxisSpec::linear(y.label()),
-            series: vec![series],
-            ..Panel::default()
-        };
-        let heading = format!("Phase portrait \u{2013} {}", title(&scenario));
-        let panels = vec![panel];
-        Chart { heading, panels }.svg()
+        let states = trace.states.iter().map(|state| state.x);
+        Chart {
+            heading: format!("Phase portrait \u{2013} {}", title(&scenario)),
+            panels: vec![Panel::of_states((x, y), states, Look::Line(0))],
+        }
+        .svg()
     })?;
     for (component, (low, high)) in [(x, results.x_range), (y, results.y_range)] {
         println!("{component}: from {low} to {high} {}", component.unit);

@@ -1,6 +1,6 @@
 //! `sim-host pil`: manoeuvres with the ECU in the loop.
 
-use super::output::{Output, check_free};
+use super::output::{Output, check_all_free, write_json, write_rows, write_text};
 use super::{Done, time_out, waveform};
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -10,7 +10,6 @@ use sim_host::closed_loop::drive::ecu_scenario;
 use sim_host::closed_loop::levels::{Levels, Target, drive};
 use sim_host::closed_loop::manoeuvre::{self, Manoeuvre};
 use sim_host::closed_loop::profile::Profile;
-use sim_host::closed_loop::record::write_csv;
 use sim_host::closed_loop::recording::Recording;
 use sim_host::closed_loop::run::{Comparison, Depth, compare};
 use sim_host::config::validate;
@@ -18,7 +17,6 @@ use sim_host::pil::elf::Image;
 use sim_host::pil::qemu::Machine;
 use sim_host::pil::session::LinkKind;
 use sim_host::report;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Drive manoeuvres with the ECU in the loop: as a model, as software on this host, and as firmware in QEMU; compare the three
@@ -108,11 +106,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         driven.push(Summary::of(&levels));
     }
     if let Some(path) = &arguments.json {
-        write_text(
-            path,
-            &(serde_json::to_string_pretty(&driven)? + "\n"),
-            arguments.force,
-        )?;
+        write_json(path, &driven, arguments.force)?;
     }
     show(&driven, arguments.link);
     Ok(if driven.iter().all(|summary| summary.agree) {
@@ -123,7 +117,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 }
 
 /// Host and emulator take turns: on one core a turn costs a switch, on two a wake-up, which can take several times as long.
-#[cfg(target_os = "linux")]
 fn keep_to_one_core() {
     use rustix::thread::{CpuSet, sched_getcpu, sched_setaffinity};
     let mut core = CpuSet::new();
@@ -131,9 +124,6 @@ fn keep_to_one_core() {
     // Where it is not allowed, the run only takes longer.
     let _ = sched_setaffinity(None, &core);
 }
-
-#[cfg(not(target_os = "linux"))]
-fn keep_to_one_core() {}
 
 impl Arguments {
     fn manoeuvres(&self) -> anyhow::Result<Vec<(Scenario<f64>, Manoeuvre)>> {
@@ -180,10 +170,7 @@ impl Arguments {
             );
         }
         let files = [&self.record, &self.out, &self.figure, &self.json];
-        files
-            .into_iter()
-            .flatten()
-            .try_for_each(|path| check_free(path, self.force))
+        check_all_free(files, self.force)
     }
 
     fn write(
@@ -203,21 +190,13 @@ impl Arguments {
             output.finish()?;
         }
         if let Some(path) = &self.out {
-            let mut output = Output::create(path, self.force)?;
-            write_csv(&run.records, output.writer())?;
-            output.finish()?;
+            write_rows(path, &run.records, self.force)?;
         }
         if let Some(path) = &self.figure {
             write_text(path, &report::drive(&levels.name, run)?, self.force)?;
         }
         Ok(())
     }
-}
-
-fn write_text(path: &Path, text: &str, force: bool) -> anyhow::Result<()> {
-    let mut output = Output::create(path, force)?;
-    output.writer().write_all(text.as_bytes())?;
-    output.finish()
 }
 
 fn with_progress(

@@ -8,7 +8,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 use sim_host::chaos::poincare::{Crossing, Direction, Section, crossings, range};
 use sim_host::component::Component;
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::report::chart::{Chart, Look, Panel};
 
 /// Poincaré section of the settled motion: its states where one component passes a value.
 #[derive(clap::Args)]
@@ -156,21 +156,15 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments
         .destinations
         .write(&results.crossings, &results, || {
-            let series = Series {
-                label: String::new(),
-                points: found.iter().map(|c| (c.x[x.index], c.x[y.index])).collect(),
-                look: Look::Dots,
-            };
-            let panel = Panel {
-                caption: format!("{} crossings of {section:.4}", found.len()),
-                x: AxisSpec::linear(x.label()),
-                y: AxisSpec::linear(y.label()),
-                series: vec![series],
-                ..Panel::default()
-            };
-            let heading = format!("Poincar\u{e9} section \u{2013} {}", title(&scenario));
-            let panels = vec![panel];
-            Chart { heading, panels }.svg()
+            let states = found.iter().map(|crossing| crossing.x);
+            Chart {
+                heading: format!("Poincar\u{e9} section \u{2013} {}", title(&scenario)),
+                panels: vec![Panel {
+                    caption: format!("{} crossings of {section:.4}", found.len()),
+                    ..Panel::of_states((x, y), states, Look::Dots)
+                }],
+            }
+            .svg()
         })?;
     println!("{} crossings of {section}", found.len());
     if let Some(time_s) = results.mean_return_time_s {

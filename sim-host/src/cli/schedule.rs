@@ -1,6 +1,6 @@
 //! `sim-host schedule`: the amplitude of dither that each wheel speed needs, as the table that the ECU carries.
 
-use super::output::{Output, check_free};
+use super::output::{check_all_free, write_json, write_rows, write_text};
 use super::sweep::with_progress;
 use super::{ConfigOptions, Done};
 use anyhow::{bail, ensure};
@@ -13,8 +13,7 @@ use sim_host::report::schedule_map;
 use sim_host::schedule::choose::Choice;
 use sim_host::schedule::map::Cell;
 use sim_host::schedule::{Analysis, Plan, runs, schedule, table};
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// The dither amplitude W that each wheel speed N needs, for square wave and sine: the table that the ECU carries.
 ///
@@ -149,9 +148,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         &arguments.json,
         &arguments.figure,
     ];
-    for path in files.into_iter().flatten() {
-        check_free(path, arguments.force)?;
-    }
+    check_all_free(files, arguments.force)?;
     let mut analyses = Vec::new();
     for (scenario, plan) in plans {
         let made = with_progress(runs(&plan) / 2, |watch| schedule(&scenario, &plan, watch))?;
@@ -204,17 +201,11 @@ impl Arguments {
 
     fn write(&self, scenario: &Scenario<f64>, analyses: &[Analysis]) -> anyhow::Result<()> {
         if let Some(path) = &self.out {
-            self.text(path, &table::source(analyses, &self.made_by(scenario)))?;
+            let source = table::source(analyses, &self.made_by(scenario));
+            write_text(path, &source, self.force)?;
         }
         if let Some(path) = &self.csv {
-            let mut output = Output::create(path, self.force)?;
-            let mut csv = csv::Writer::from_writer(output.writer());
-            for row in analyses.iter().flat_map(rows) {
-                csv.serialize(row)?;
-            }
-            csv.flush()?;
-            drop(csv);
-            output.finish()?;
+            write_rows(path, analyses.iter().flat_map(rows), self.force)?;
         }
         if let Some(path) = &self.json {
             let results = Results {
@@ -222,18 +213,12 @@ impl Arguments {
                 timing: Timing::new(self.transient, self.time)?,
                 schedules: analyses,
             };
-            self.text(path, &(serde_json::to_string_pretty(&results)? + "\n"))?;
+            write_json(path, &results, self.force)?;
         }
         if let Some(path) = &self.figure {
-            self.text(path, &schedule_map(analyses)?)?;
+            write_text(path, &schedule_map(analyses)?, self.force)?;
         }
         Ok(())
-    }
-
-    fn text(&self, path: &Path, text: &str) -> anyhow::Result<()> {
-        let mut output = Output::create(path, self.force)?;
-        output.writer().write_all(text.as_bytes())?;
-        output.finish()
     }
 
     /// The command, and what it was run on.

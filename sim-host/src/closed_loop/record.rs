@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 use shared_model::friction::FrictionMode;
-use std::io::Write;
 
 /// The plant at one moment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -34,19 +33,4 @@ pub struct Record {
 
 fn lower_case<S: serde::Serializer>(mode: &FrictionMode, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&format!("{mode:?}").to_lowercase())
-}
-
-/// Writes records as CSV, one row each, the columns named as the fields are.
-///
-/// # Errors
-/// If `writer` does not take them.
-pub fn write_csv<'a>(
-    records: impl IntoIterator<Item = &'a Record>,
-    writer: impl Write,
-) -> csv::Result<()> {
-    let mut csv = csv::Writer::from_writer(writer);
-    for record in records {
-        csv.serialize(record)?;
-    }
-    Ok(csv.flush()?)
 }

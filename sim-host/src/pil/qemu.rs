@@ -266,7 +266,6 @@ pub(super) fn start(
 }
 
 /// Has the kernel end the emulator should this program be killed, when no destructor runs.
-#[cfg(target_os = "linux")]
 fn end_with_parent(command: &mut Command) {
     use std::os::unix::process::CommandExt;
     // SAFETY: between fork and exec only async-signal-safe calls are allowed, and prctl is one.
@@ -277,9 +276,6 @@ fn end_with_parent(command: &mut Command) {
         });
     }
 }
-
-#[cfg(not(target_os = "linux"))]
-fn end_with_parent(_command: &mut Command) {}
 
 /// `None` if the time is over.
 pub(super) fn wait(child: &mut Child, limit: Duration) -> Result<Option<ExitStatus>, RunError> {

@@ -132,9 +132,7 @@ impl Session {
     pub fn receive(&mut self) -> Result<ToHost, RunError> {
         let mut bytes = [0; TO_HOST_LEN];
         let received = match &mut self.transport {
-            Transport::Files { from_ecu, .. } => {
-                wait_readable(from_ecu, self.limit).and_then(|()| from_ecu.read_exact(&mut bytes))
-            }
+            Transport::Files { from_ecu, .. } => read_exact(from_ecu, self.limit, &mut bytes),
             Transport::Uart { stream, deframer } => receive_packet(stream, deframer, &mut bytes),
         };
         match received {
@@ -308,6 +306,18 @@ impl Opening<'_> {
     }
 }
 
+/// Fills `bytes`, waiting at most `limit` for each piece: a faulty ECU may stop in the middle of a packet.
+fn read_exact(file: &mut File, limit: Duration, mut bytes: &mut [u8]) -> std::io::Result<()> {
+    while !bytes.is_empty() {
+        wait_readable(file, limit)?;
+        match file.read(bytes)? {
+            0 => return Err(ErrorKind::UnexpectedEof.into()),
+            length => bytes = &mut bytes[length..],
+        }
+    }
+    Ok(())
+}
+
 fn wait_readable(file: &File, limit: Duration) -> std::io::Result<()> {
     use rustix::event::{PollFd, PollFlags, Timespec, poll};
     let limit = Timespec {
@@ -344,5 +354,28 @@ fn receive_packet(
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::fd::OwnedFd;
+
+    #[test]
+    fn half_a_packet_ends_with_the_limit_and_a_closed_link_at_once() {
+        let (ours, mut theirs) = std::io::pipe().expect("a pipe can be made");
+        let mut ours = File::from(OwnedFd::from(ours));
+        let mut read = || {
+            let mut bytes = [0; TO_HOST_LEN];
+            read_exact(&mut ours, Duration::from_millis(20), &mut bytes)
+                .map_err(|error| error.kind())
+        };
+        theirs.write_all(&[0; TO_HOST_LEN]).expect("it takes them");
+        assert_eq!(read(), Ok(()));
+        theirs.write_all(&[0; 2]).expect("it takes them");
+        assert_eq!(read(), Err(ErrorKind::TimedOut));
+        drop(theirs);
+        assert_eq!(read(), Err(ErrorKind::UnexpectedEof));
     }
 }

@@ -6,6 +6,8 @@ use super::figure::reduce::{Point, curve};
 use super::figure::style::{
     Area, DOTS, INK, INSTANT, LEVEL, Line, RUNS, Sample, TEXT_FONT, WIDTH, figure, text, text_width,
 };
+use crate::component::Component;
+use nalgebra::Vector4;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// A figure: panels stacked below a heading and a legend.
@@ -230,6 +232,26 @@ impl Layout {
 }
 
 impl Panel {
+    /// States with one component over another, without a caption.
+    pub fn of_states(
+        (x, y): (Component, Component),
+        states: impl IntoIterator<Item = Vector4<f64>>,
+        look: Look,
+    ) -> Self {
+        let states = states.into_iter();
+        let series = Series {
+            label: String::new(),
+            points: states.map(|s| (s[x.index], s[y.index])).collect(),
+            look,
+        };
+        Self {
+            x: AxisSpec::linear(x.label()),
+            y: AxisSpec::linear(y.label()),
+            series: vec![series],
+            ..Self::default()
+        }
+    }
+
     /// Points that are finite.
     fn points(&self) -> impl Iterator<Item = Point> + '_ {
         let all = self.series.iter().flat_map(|series| &series.points);

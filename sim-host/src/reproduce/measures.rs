@@ -193,17 +193,11 @@ fn section(named: &Named, scenario: &Scenario<f64>) -> Result<Drawing, SectionEr
             heading: "Poincar\u{e9} section of the chaotic motion".into(),
             panels: vec![Panel {
                 caption: section.to_string(),
-                x: AxisSpec::linear(Component::SIDESLIP.label()),
-                y: AxisSpec::linear(Component::STEERING_ANGLE.label()),
-                series: vec![Series {
-                    label: String::new(),
-                    points: found
-                        .iter()
-                        .map(|crossing| (crossing.x[0], crossing.x[2]))
-                        .collect(),
-                    look: Look::Dots,
-                }],
-                ..Panel::default()
+                ..Panel::of_states(
+                    (Component::SIDESLIP, Component::STEERING_ANGLE),
+                    found.iter().map(|crossing| crossing.x),
+                    Look::Dots,
+                )
             }],
         },
         csv: table.csv(),

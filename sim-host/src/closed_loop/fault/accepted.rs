@@ -1,6 +1,7 @@
 //! Faults that may stay unfound, each with its reason. Any other silent fault fails.
 
 use super::catalogue::{Fault, Kind, SensorFailure, ServoFailure, Signal};
+use super::processor::Action;
 
 /// Greatest jump of the wheel speed that passes for one of the vehicle, as a share of its range: 20 of 2500 rpm.
 const WHEEL_SPEED_SHARE: f32 = 0.008;
@@ -77,11 +78,9 @@ pub fn reason(fault: &Fault) -> Option<&'static str> {
 }
 
 /// The same of what is done to the processor.
-#[cfg(unix)]
-pub fn reason_on_processor(action: super::processor::Action) -> Option<&'static str> {
-    use super::processor::Action::Flip;
+pub fn reason_on_processor(action: Action) -> Option<&'static str> {
     // Variables begin where the code is at its end on every Cortex-M.
-    let is_code = matches!(action, Flip { address, .. } if address < 0x2000_0000);
+    let is_code = matches!(action, Action::Flip { address, .. } if address < 0x2000_0000);
     is_code.then_some(
         "a bit of the program itself: both channels run it; flash with error correction, or a checksum of it, would find it",
     )

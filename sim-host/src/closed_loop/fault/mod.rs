@@ -5,7 +5,7 @@
 //! | what can be done? | [`catalogue`] |
 //! | how is it done to what passes between vehicle and ECU? | [`injector`] |
 //! | how to the ECU's interrupts? | [`tasks`] |
-//! | how to the memory and the core of the ECU on its processor? | `processor`, `memory` |
+//! | how to the memory and the core of the ECU on its processor? | [`processor`], [`memory`] |
 //! | was it found, when, and what came of it? | [`judge`] |
 //! | which faults may stay unfound, and why? | [`accepted`] |
 //! | all of them, on all manoeuvres | [`campaign`] |
@@ -16,8 +16,6 @@ pub mod catalogue;
 pub mod injector;
 pub mod judge;
 pub mod manoeuvres;
-#[cfg(unix)]
 pub mod memory;
-#[cfg(unix)]
 pub mod processor;
 pub mod tasks;

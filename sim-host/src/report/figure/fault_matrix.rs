@@ -1,6 +1,8 @@
 //! Faults by manoeuvres: what became of them, and how late the last of each kind was found.
 
-use super::style::{Area, FAINT_INK, INK, Sample, TEXT_FONT, TICK_FONT, WIDTH, figure, text};
+use super::style::{
+    Area, FAINT_INK, INK, Sample, TEXT_FONT, TICK_FONT, WIDTH, figure, text, text_width,
+};
 use crate::closed_loop::fault::campaign::Row;
 use crate::closed_loop::fault::judge::Verdict;
 use crate::report::text::wrap;
@@ -8,14 +10,14 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 /// Room left of the matrix, above it and right of it.
-const LEFT: i32 = 470;
+const LEFT: i32 = 450;
 const TOP: i32 = 190;
 const RIGHT: i32 = 16;
 const CELL_HEIGHT: i32 = 36;
 const GAP: i32 = 3;
 const NUMBER_WIDTH: i32 = 24;
-/// Characters of a manoeuvre's name in a line.
-const COLUMN_CHARACTERS: usize = 12;
+/// Height of a column's head: with it the longest word of a manoeuvre's name is no wider than a column.
+const HEAD_FONT: u32 = 22;
 const LINE_STEP: i32 = 28;
 
 /// What became of faults, from dark to light, and the colour of text on it.
@@ -65,7 +67,7 @@ pub fn draw(rows: &[Row]) -> anyhow::Result<String> {
         legend.push(("silent, not on it".into(), Sample::Shade(UNLISTED)));
     }
     figure(heading, &legend, height as u32, |area| {
-        let width = (WIDTH as i32 - LEFT - RIGHT) / manoeuvres.len().max(1) as i32;
+        let width = column_width(manoeuvres.len());
         names(area, &kinds, &manoeuvres, width)?;
         for (k, kind) in kinds.iter().enumerate() {
             for (m, manoeuvre) in manoeuvres.iter().enumerate() {
@@ -77,6 +79,10 @@ pub fn draw(rows: &[Row]) -> anyhow::Result<String> {
         }
         Ok(())
     })
+}
+
+fn column_width(columns: usize) -> i32 {
+    (WIDTH as i32 - LEFT - RIGHT) / columns.max(1) as i32
 }
 
 fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
@@ -91,13 +97,13 @@ fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 
 fn names(area: &Area, kinds: &[&str], manoeuvres: &[&str], width: i32) -> anyhow::Result<()> {
     let right = |colour| text(TICK_FONT, colour).pos(Pos::new(HPos::Right, VPos::Center));
-    let middle = text(TICK_FONT, INK).pos(Pos::new(HPos::Center, VPos::Center));
+    let middle = text(HEAD_FONT, INK).pos(Pos::new(HPos::Center, VPos::Center));
     for (k, kind) in kinds.iter().enumerate() {
         let y = TOP + CELL_HEIGHT * k as i32 + CELL_HEIGHT / 2;
         area.draw_text(kind, &right(INK), (LEFT - 12, y))?;
     }
     for (m, manoeuvre) in manoeuvres.iter().enumerate() {
-        let lines = wrap(manoeuvre, COLUMN_CHARACTERS);
+        let lines = head(manoeuvre, width);
         let x = LEFT + width * m as i32 + width / 2;
         for (n, line) in lines.iter().rev().enumerate() {
             let y = TOP - LINE_STEP / 2 - 6 - LINE_STEP * n as i32;
@@ -108,6 +114,11 @@ fn names(area: &Area, kinds: &[&str], manoeuvres: &[&str], width: i32) -> anyhow
     area.draw_text("manoeuvre \u{2192}", &axes, (LEFT - 190, TOP - 50))?;
     area.draw_text("kind of fault \u{2193}", &axes, (LEFT - 190, TOP - 20))?;
     Ok(())
+}
+
+/// A manoeuvre's name in lines that are no wider than its column.
+fn head(manoeuvre: &str, width: i32) -> Vec<String> {
+    wrap(manoeuvre, (width / text_width("m", HEAD_FONT)) as usize)
 }
 
 /// The shares of the verdicts side by side, and the worst latency on the first.
@@ -145,4 +156,23 @@ fn cell(area: &Area, (left, top): (i32, i32), width: i32, rows: &[&Row]) -> anyh
         area.draw_text(&latency.to_string(), &style, at)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::closed_loop::fault::manoeuvres;
+
+    #[test]
+    fn heads_keep_to_their_columns_and_words_are_whole() {
+        let manoeuvres = manoeuvres::all().unwrap();
+        // One more is the processor's.
+        let width = column_width(manoeuvres.len() + 1);
+        for (_, manoeuvre) in &manoeuvres {
+            let lines = head(&manoeuvre.name, width);
+            assert_eq!(lines.join(" "), manoeuvre.name);
+            let widest = lines.iter().map(|line| text_width(line, HEAD_FONT)).max();
+            assert!(widest.unwrap() <= width, "{lines:?}");
+        }
+    }
 }
