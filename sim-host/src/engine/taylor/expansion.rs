@@ -169,14 +169,18 @@ impl<S: Simd, const V: usize> Axle<S, V> {
     }
 }
 
-/// Coefficient `n` of the product of two series.
+/// Coefficient `n` of the product of two series. The terms that were known last are added last: the processor has added the
+/// others by then.
 #[inline(always)]
 fn product<S: Simd, const V: usize>(a: &Series<S, V>, b: &Series<S, V>, n: usize) -> Lanes<S, V> {
-    let mut sum = a[0] * b[n];
-    for j in 1..=n {
+    if n == 0 {
+        return a[0] * b[0];
+    }
+    let mut sum = a[0].zero();
+    for j in 1..n {
         sum = a[j].mul_add(b[n - j], sum);
     }
-    sum
+    a[n].mul_add(b[0], a[0].mul_add(b[n], sum))
 }
 
 /// Coefficient `n` of the square of a series.
@@ -185,16 +189,16 @@ fn square<S: Simd, const V: usize>(a: &Series<S, V>, n: usize) -> Lanes<S, V> {
     if n == 0 {
         return a[0] * a[0];
     }
-    let mut half = a[0] * a[n];
+    let mut sum = a[0].zero();
     for j in 1..n.div_ceil(2) {
-        half = a[j].mul_add(a[n - j], half);
+        sum = a[j].mul_add(a[n - j], sum);
     }
-    let twice = half + half;
-    if n % 2 == 0 {
-        a[n / 2].mul_add(a[n / 2], twice)
-    } else {
-        twice
+    sum = sum + sum;
+    if n.is_multiple_of(2) {
+        sum = a[n / 2].mul_add(a[n / 2], sum);
     }
+    let first = a[0] + a[0];
+    first.mul_add(a[n], sum)
 }
 
 /// Value at `t` of a series.
@@ -258,27 +262,44 @@ impl<S: Simd, const V: usize, const K: usize> Expansion<S, V, K> {
     /// Works out all coefficients from those of order 0, which are the state and the tangent vectors.
     #[inline(always)]
     pub fn expand(&mut self, system: &System<Lanes<S, V>>) {
+        // One by one: with the order a constant all loops are unrolled, which takes a third off the time.
+        self.advance::<0>(system);
+        self.advance::<1>(system);
+        self.advance::<2>(system);
+        self.advance::<3>(system);
+        self.advance::<4>(system);
+        self.advance::<5>(system);
+        self.advance::<6>(system);
+        self.advance::<7>(system);
+        self.advance::<8>(system);
+        self.advance::<9>(system);
+        self.advance::<10>(system);
+        self.advance::<11>(system);
+        const { assert!(ORDER == 12) };
+    }
+
+    /// Coefficients `N + 1` from those up to `N`.
+    #[inline(always)]
+    fn advance<const N: usize>(&mut self, system: &System<Lanes<S, V>>) {
         let (front, rear) = (&mut self.front, &mut self.rear);
-        for n in 0..ORDER {
-            let (front_angle, rear_angle) = slip_angles(system, &self.x, n);
-            front.slip_angle[n] = front_angle;
-            rear.slip_angle[n] = rear_angle;
-            front.load(n, system.front_linear, system.front_cubic, K > 0);
-            rear.load(n, system.rear_linear, system.rear_cubic, K > 0);
-            advance(system, &mut self.x, n, front.force[n], rear.force[n]);
-            if n == 0 {
-                let series = &mut self.x[STEERING_RATE];
-                series[1] = series[1] + system.acceleration;
-            }
-            for k in 0..K {
-                let tangent = &mut self.tangents[k];
-                let (front_angle, rear_angle) = slip_angles(system, &tangent.x, n);
-                tangent.front_slip_angle[n] = front_angle;
-                tangent.rear_slip_angle[n] = rear_angle;
-                let front_force = product(&front.slope, &tangent.front_slip_angle, n);
-                let rear_force = product(&rear.slope, &tangent.rear_slip_angle, n);
-                advance(system, &mut tangent.x, n, front_force, rear_force);
-            }
+        let (front_angle, rear_angle) = slip_angles(system, &self.x, N);
+        front.slip_angle[N] = front_angle;
+        rear.slip_angle[N] = rear_angle;
+        front.load(N, system.front_linear, system.front_cubic, K > 0);
+        rear.load(N, system.rear_linear, system.rear_cubic, K > 0);
+        advance(system, &mut self.x, N, front.force[N], rear.force[N]);
+        if N == 0 {
+            let series = &mut self.x[STEERING_RATE];
+            series[1] = series[1] + system.acceleration;
+        }
+        for k in 0..K {
+            let tangent = &mut self.tangents[k];
+            let (front_angle, rear_angle) = slip_angles(system, &tangent.x, N);
+            tangent.front_slip_angle[N] = front_angle;
+            tangent.rear_slip_angle[N] = rear_angle;
+            let front_force = product(&front.slope, &tangent.front_slip_angle, N);
+            let rear_force = product(&rear.slope, &tangent.rear_slip_angle, N);
+            advance(system, &mut tangent.x, N, front_force, rear_force);
         }
     }
 }

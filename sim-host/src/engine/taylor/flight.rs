@@ -652,7 +652,7 @@ fn clearance<S: Simd, const V: usize>(
     end: Lanes<S, V>,
     step_s: Lanes<S, V>,
 ) -> Lanes<S, V> {
-    let zero = step_s - step_s;
+    let zero = step_s.zero();
     let begin = series[0];
     let end = begin.select_less(zero, -end, end);
     begin.abs().min(end)

@@ -8,7 +8,10 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 /// One number of each motion. All arithmetic is lane by lane and correctly rounded, multiplication with addition fused, so a
 /// lane's bits depend neither on its neighbours nor on the instruction set.
+///
+/// Aligned to a line of the cache: the steps wait for loads, and one across two lines counts twice.
 #[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
 pub(super) struct Lanes<S: Simd, const V: usize> {
     simd: S,
     vectors: [S::f64s; V],
@@ -23,6 +26,12 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
     pub fn splat(simd: S, value: f64) -> Self {
         let vectors = [simd.splat_f64s(value); V];
         Self { simd, vectors }
+    }
+
+    /// Zero in all lanes.
+    #[inline(always)]
+    pub fn zero(self) -> Self {
+        Self::splat(self.simd, 0.0)
     }
 
     /// The lanes as a slice.
