@@ -5,7 +5,6 @@ model's, exported by the Rust program in `rust/`; `check` compares the text with
 """
 
 import json
-import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,12 +17,12 @@ ERROR_TIME_S = 10.0
 """When the error is measured: later, chaos has amplified any error to the size of the attractor."""
 ERROR_LIMIT = 7e-8
 """Largest error allowed there: the worst lane's largest component, in rad and rad/s."""
-START = (0.01, 0.01, 0.001, 0.0)
-TANGENT_NORM = 0.01
-"""Length of the tangent vector after a renormalisation: the state's size, so that a step-size control heeds both."""
-TANGENT_START = (0.005, 0.005, 0.005, 0.005)
-RENORMALISATION_S = 10.0
-"""Time between two renormalisations of the tangent vector; it grows some 200-fold in it."""
+EXPORT = json.loads((BUILD / "model.json").read_text())
+"""What the Rust program exported."""
+START = tuple(EXPORT["start"])
+TANGENT_START = tuple(EXPORT["tangent_start"])
+TANGENT_NORM = EXPORT["tangent_norm"]
+RENORMALISATION_S = EXPORT["renormalisation_s"]
 
 
 class Coefficients(NamedTuple):
@@ -93,6 +92,5 @@ def driving_torque_nm(x, c):
 
 
 def exported():
-    """What the Rust program exported: the coefficients of each lane, and reference values of the right-hand side."""
-    export = json.loads((BUILD / "model.json").read_text())
-    return [Coefficients(**lane) for lane in export["lanes"]], export["samples"]
+    """The coefficients of each lane, and the shared model's values of the right-hand side at random states."""
+    return [Coefficients(**lane) for lane in EXPORT["lanes"]], EXPORT["samples"]

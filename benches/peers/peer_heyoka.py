@@ -28,13 +28,16 @@ FRICTION_PAR, FREE_PAR = len(SPEED_DEPENDENT), len(SPEED_DEPENDENT) + 1
 class Heyoka:
     """heyoka with `batch` lanes side by side."""
 
-    jobs = {job: [10.0 ** (-k / 2) for k in range(10, 29)] for job in "SLF"}
+    version = hy.__version__
     setting_name = "tolerance"
+    settings = [10.0 ** (-k / 2) for k in range(10, 29)]
+    cannot = {}
 
     def __init__(self, batch, precision="double"):
         self.batch = batch
         self.real = {"double": float, "long double": np.longdouble}[precision]
-        self.lanes, _ = exported()
+        self.name = f"heyoka batch {batch}" if batch > 1 else "heyoka scalar"
+        self.lanes, self.samples = exported()
 
     def expressions(self, job):
         """State variables, tangent variables and right-hand sides; what differs between lanes is a runtime parameter."""
@@ -47,18 +50,19 @@ class Heyoka:
             equations += list(zip(tangent, tangent_rates(x, tangent, c)))
         return equations, x, c
 
-    def check(self, sample):
-        """The compiled right-hand sides at one of the shared model's samples."""
-        values = []
-        for job in "FL":
-            equations, _, _ = self.expressions(job)
-            compiled = hy.cfunc([rhs for _, rhs in equations], [var for var, _ in equations])
-            inputs = sample["x"] + (sample["tangent"] if job == "L" else [])
-            lane = self.lanes[sample["lane"]]
-            pars = [getattr(lane, name) for name in SPEED_DEPENDENT] + [sample["friction_nm"], sample["free"]]
-            pars = pars if job == "F" else pars[: len(SPEED_DEPENDENT)]
-            values.append(compiled(np.array(inputs), pars=np.array(pars)))
-        return values[0], values[1][4:]
+    def check(self):
+        """The compiled right-hand sides at the shared model's samples."""
+        (state, _, _), (both, _, _) = self.expressions("F"), self.expressions("L")
+        rates_at, tangent_rates_at = (
+            hy.cfunc([rhs for _, rhs in equations], [var for var, _ in equations]) for equations in (state, both)
+        )
+        for s in self.samples:
+            pars = [getattr(self.lanes[s["lane"]], name) for name in SPEED_DEPENDENT]
+            friction = [s["friction_nm"], s["free"]]
+            yield (
+                rates_at(np.array(s["x"]), pars=np.array(pars + friction)),
+                tangent_rates_at(np.array(s["x"] + s["tangent"]), pars=np.array(pars))[4:],
+            )
 
     def prepare(self, job, tolerance):
         """Compiles; the result runs the job up to a time."""

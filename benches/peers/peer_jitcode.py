@@ -55,12 +55,15 @@ class Jitcode:
     def check(self):
         """The right-hand sides at the shared model's samples without friction."""
         ode = self.compile("L")
+        ode.set_integrator("dop853")
         for s in self.samples:
             if s["free"] != 1.0 or s["friction_nm"] != 0.0:
                 yield None
                 continue
-            c = self.lanes[s["lane"]]
-            values = ode.f(0.0, np.array(s["x"] + s["tangent"]), *(getattr(c, name) for name in SPEED_DEPENDENT))
+            self.set_lane(ode, self.lanes[s["lane"]])
+            ode.set_initial_value(np.array(START + TANGENT_START), 0.0)
+            ode.integrate(1e-9)  # Hands the parameters to the compiled code.
+            values = ode.f(0.0, np.array(s["x"] + s["tangent"]))
             yield values[:4], values[4:]
 
     def prepare(self, job, tolerance):

@@ -69,7 +69,7 @@ class Numba:
     name = "numba RK4"
     version = numba.__version__
     setting_name = "step (s)"
-    settings = [1 / rate_hz for rate_hz in (100, 125, 160, 200, 250, 320, 400, 500, 640, 800, 1000, 1250, 1600, 2000)]
+    settings = [1 / rate_hz for rate_hz in (100, 125, 160, 200, 250, 320, 400, 500, 640, 800, 1000, 1250, 1600, 2000, 2500, 3200, 4000)]
     cannot = {"F": "no integrator of its own, hence no events: whatever located them would be ours"}
 
     def __init__(self):

@@ -155,8 +155,7 @@ pub fn samples() -> Vec<Sample> {
             // Exact but for rounding: the right-hand side is a cubic polynomial.
             let difference = |h: f64| rates(x + tangent * h) - rates(x - tangent * h);
             let step = 0.25;
-            let tangent_rates =
-                (difference(step) * 8.0 - difference(2.0 * step)) / (12.0 * step);
+            let tangent_rates = (difference(step) * 8.0 - difference(2.0 * step)) / (12.0 * step);
             samples.push(Sample {
                 lane,
                 friction_nm,

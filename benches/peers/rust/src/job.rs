@@ -34,7 +34,10 @@ fn run(mut lane: impl FnMut(&Coefficients) -> ([f64; 4], Option<f64>, Option<u32
 }
 
 /// Job S: the state alone. `integrate` takes a state over some seconds.
-pub fn state(until_s: f64, integrate: impl Fn(&Coefficients, [f64; 4], f64) -> [f64; 4]) -> Outcome {
+pub fn state(
+    until_s: f64,
+    integrate: impl Fn(&Coefficients, [f64; 4], f64) -> [f64; 4],
+) -> Outcome {
     run(|c| (integrate(c, START, until_s), None, None))
 }
 

@@ -26,7 +26,10 @@ fn main() {
                 "diffsol" => diffsol::run(job, tolerance, until_s),
                 _ => panic!("no peer {peer}"),
             };
-            println!("{}", json!(outcome.expect("a job that the peer can express")));
+            println!(
+                "{}",
+                json!(outcome.expect("a job that the peer can express"))
+            );
         }
         _ => panic!("usage: peers export | peers PEER JOB TOLERANCE SECONDS"),
     }

@@ -8,7 +8,8 @@ pub const START: [f64; 4] = [0.01, 0.01, 0.001, 0.0];
 pub const TANGENT_START: [f64; 4] = [0.005; 4];
 /// Length of the tangent vector after a renormalisation: the state's size, so that a step-size control heeds both.
 pub const TANGENT_NORM: f64 = 0.01;
-/// Time between two renormalisations of the tangent vector; it grows up to some 1000-fold in it.
+/// Time between two renormalisations of the tangent vector. In it the vector grows 9-fold in the median, at most 1.1e5-fold;
+/// the greatest growth comes in bursts and is 9e4-fold in half the time as well.
 pub const RENORMALISATION_S: f64 = 10.0;
 
 /// First step after a change of friction's mode, where a peer looks for events by signs at the ends of steps: a mode that
