@@ -35,11 +35,6 @@ impl Guard {
         };
         Self { mode, lower, upper }
     }
-
-    /// The mode ends some time.
-    pub fn can_end(&self) -> bool {
-        self.lower.is_finite() || self.upper.is_finite()
-    }
 }
 
 /// The mode that follows `from`, which ends at `x`; puts the friction law's argument exactly on the step that it passes.

@@ -337,3 +337,197 @@ fn advance<S: Simd, const V: usize>(
     x[STEERING_ANGLE][n + 1] = rate.scale(inverse);
     x[STEERING_RATE][n + 1] = steering.scale(inverse);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector4;
+    use proptest::prelude::*;
+    use pulp::Scalar;
+    use shared_model::Scenario;
+    use shared_model::dither::Waveform;
+    use shared_model::friction::FrictionLaw;
+    use shared_model::vehicle::State;
+
+    const MODES: [FrictionMode; 4] = [
+        FrictionMode::Sticking,
+        FrictionMode::Negative,
+        FrictionMode::Neutral,
+        FrictionMode::Positive,
+    ];
+
+    /// Scenarios over the whole ranges that the analyses meet.
+    fn scenario() -> impl Strategy<Value = Scenario<f64>> {
+        let laws = [
+            FrictionLaw::None,
+            FrictionLaw::CoulombRate,
+            FrictionLaw::PrintedAngle,
+        ];
+        let waveforms = [Waveform::None, Waveform::Square, Waveform::Sine];
+        let choice = (0..laws.len(), 0..waveforms.len());
+        let numbers = (
+            300.0..3000.0,
+            0.0..2.0,
+            -3.0..3.0,
+            0.5..2.0,
+            0.5..2.0,
+            0.0..5.0,
+        );
+        (choice, numbers).prop_map(move |((law, waveform), n)| {
+            let mut scenario = Scenario::reconstruction();
+            scenario.friction.law = laws[law];
+            scenario.dither.waveform = waveforms[waveform];
+            scenario.run.wheel_speed_rpm = n.0;
+            scenario.dither.amplitude_v = 0.2 * n.1;
+            scenario.steering.motor_current_a = n.2;
+            scenario.vehicle.mass_kg *= n.3;
+            scenario.tires.front.peak_n *= n.4;
+            scenario.friction.coefficient *= n.5;
+            scenario
+        })
+    }
+
+    fn state() -> impl Strategy<Value = Vector4<f64>> {
+        (-1.0..1.0, -3.0..3.0, -1.0..1.0, -8.0..8.0)
+            .prop_map(|(beta, gamma, delta, rate)| Vector4::new(beta, gamma, delta, rate))
+    }
+
+    fn model(scenario: &Scenario<f64>) -> (Model<f64>, Injection<f64>) {
+        (Model::new(scenario), scenario.dither.injection(0.0))
+    }
+
+    /// The expansion with one tangent vector.
+    fn expansion(
+        (model, injection): &(Model<f64>, Injection<f64>),
+        mode: FrictionMode,
+        x: &Vector4<f64>,
+        tangent: &Vector4<f64>,
+    ) -> Expansion<Scalar, 1, 1> {
+        let simd = Scalar::new();
+        let mut system = System::still(simd);
+        let numbers = System::new(model, *injection, mode).expect("cubic, small angles");
+        system.set_lane(0, numbers);
+        let mut expansion = Expansion::new(simd);
+        for i in 0..4 {
+            expansion.x[i][0] = Lanes::splat(simd, x[i]);
+            expansion.tangents[0].x[i][0] = Lanes::splat(simd, tangent[i]);
+        }
+        expansion.expand(&system);
+        expansion
+    }
+
+    fn coefficient(series: &[Series<Scalar, 1>; 4], n: usize) -> Vector4<f64> {
+        Vector4::from_fn(|i, _| series[i][n].as_slice()[0])
+    }
+
+    fn at(series: &[Series<Scalar, 1>; 4], t: f64) -> Vector4<f64> {
+        let powers = |n: usize| coefficient(series, n) * t.powi(n as i32);
+        (0..=ORDER).rev().map(powers).sum()
+    }
+
+    fn rate_at(series: &[Series<Scalar, 1>; 4], t: f64) -> Vector4<f64> {
+        let powers = |n: usize| coefficient(series, n) * (n as f64 * t.powi(n as i32 - 1));
+        (1..=ORDER).rev().map(powers).sum()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+
+        /// The first coefficient is the shared model's derivative, to the rounding of its terms.
+        #[test]
+        fn the_right_hand_side_is_the_models(
+            scenario in scenario(),
+            x in state(),
+            mode in 0..MODES.len(),
+        ) {
+            let parts = model(&scenario);
+            let mode = MODES[mode];
+            let expansion = expansion(&parts, mode, &x, &Vector4::zeros());
+            let found = coefficient(&expansion.x, 1);
+            let wanted = parts.0.derivative(&x, parts.1, mode);
+            // Sizes of the terms, which cancel.
+            let constants = parts.0.constants();
+            let (Tire::Cubic(front), Tire::Cubic(rear)) = parts.0.tires() else {
+                unreachable!("the scenarios have cubic tyres")
+            };
+            let size = |tire: &shared_model::tire::CubicTire<f64>, angle: f64| {
+                let tire = tire.averaged(parts.1);
+                angle * (tire.linear_n_per_rad.abs() + tire.cubic_n_per_rad3.abs() * angle * angle)
+            };
+            let (beta, gamma) = (x[0].abs(), x[1].abs());
+            let front = size(front, beta + constants.front_lever_s * gamma + x[2].abs());
+            let rear = size(rear, beta + constants.rear_lever_s * gamma);
+            let torque = constants.motor_torque_nm.abs()
+                + constants.trail_m * front
+                + constants.damping_nm_s_per_rad * x[3].abs()
+                + parts.0.friction_limit_nm();
+            let sizes = [
+                (front + rear) * constants.lateral_gain + x[1].abs(),
+                front * constants.front_yaw_gain + rear * constants.rear_yaw_gain,
+                x[3].abs(),
+                torque * constants.inverse_steering_inertia,
+            ];
+            for i in 0..4 {
+                let ulps = (found[i] - wanted[i]).abs() / (f64::EPSILON * sizes[i].max(1e-3));
+                prop_assert!(ulps < 8.0, "component {i}: {ulps} ulps: {} {}", found[i], wanted[i]);
+            }
+        }
+
+        /// All other coefficients: a short step on, the polynomial's rate is the model's derivative where the polynomial is.
+        #[test]
+        fn the_polynomial_satisfies_the_equation(
+            scenario in scenario(),
+            x in state(),
+            mode in 0..MODES.len(),
+        ) {
+            let parts = model(&scenario);
+            let mut x = x;
+            let mode = MODES[mode];
+            if mode == FrictionMode::Sticking {
+                x[3] = 0.0;
+            }
+            let expansion = expansion(&parts, mode, &x, &Vector4::zeros());
+            let last = coefficient(&expansion.x, ORDER).amax();
+            // The term left out is of the size of the last one.
+            let step_s = (1e-13 / last.max(1e-10)).powf(1.0 / ORDER as f64);
+            let on = at(&expansion.x, step_s);
+            let found = rate_at(&expansion.x, step_s);
+            let wanted = parts.0.derivative(&on, parts.1, mode);
+            let size = wanted.amax().max(found.amax()).max(1.0);
+            let error = (found - wanted).amax() / size;
+            prop_assert!(error < 1e-9, "{error} at {step_s} s");
+        }
+
+        /// The tangent's series is the derivative of the state's by its start.
+        #[test]
+        fn the_tangent_is_the_difference_of_neighbours(
+            scenario in scenario(),
+            x in state(),
+            tangent in state(),
+        ) {
+            let parts = model(&scenario);
+            let mode = FrictionMode::Positive;
+            let small = 1e-5;
+            let here = expansion(&parts, mode, &x, &tangent);
+            let ahead = expansion(&parts, mode, &(x + tangent * small), &tangent);
+            let behind = expansion(&parts, mode, &(x - tangent * small), &tangent);
+            for n in 0..=ORDER {
+                let found = coefficient(&here.tangents[0].x, n);
+                let wanted =
+                    (coefficient(&ahead.x, n) - coefficient(&behind.x, n)) / (2.0 * small);
+                let size = wanted.amax().max(coefficient(&here.x, n).amax()).max(1.0);
+                prop_assert!((found - wanted).amax() < 1e-4 * size, "order {n}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_polynomial_is_refused() {
+        let mut exact = Scenario::reconstruction();
+        exact.vehicle.slip_form = SlipForm::Exact;
+        let (model, injection) = model(&exact);
+        assert!(System::new(&model, injection, FrictionMode::Neutral).is_none());
+        let state: State<f64> = model.initial_state(&exact);
+        assert_eq!(state.x[0], exact.run.sideslip_rad);
+    }
+}

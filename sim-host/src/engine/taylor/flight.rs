@@ -36,6 +36,8 @@ struct Lane<'a, const K: usize> {
     task: &'a Task,
     /// Index of the task.
     index: usize,
+    /// Steps of the flight before it.
+    steps_before: usize,
     mode: FrictionMode,
     /// Changes of mode in a row that came too soon.
     short_modes: usize,
@@ -54,6 +56,7 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize> {
     /// Ends of the pieces, s from the start.
     ends_s: Vec<f64>,
     next_task: usize,
+    steps: usize,
     lanes: Vec<Option<Lane<'a, K>>>,
     results: Vec<Option<Found<K>>>,
     /// Index of the friction law's argument in a state, if a mode can end at all.
@@ -65,6 +68,8 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize> {
     step_s: Lanes<S, V>,
     /// What is left of the piece, s; infinite in an empty lane.
     left_s: Lanes<S, V>,
+    /// Lanes whose friction mode ends in the present step, each with the bound that ends it.
+    ends_of_modes: Vec<(usize, f64)>,
     /// Lengths that tangent vectors had when they were made unit vectors, multiplied up.
     stretch: [Lanes<S, V>; K],
 }
@@ -78,20 +83,19 @@ struct GuardLanes<L> {
 }
 
 impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
-    /// Motions at their starts.
+    /// Motions at their starts, all with the same friction argument.
     pub fn new(simd: S, tasks: &'a [Task], span: &'a Span) -> Self {
         let splat = |number| Lanes::splat(simd, number);
-        let can_end = |task: &Task| Guard::of(&task.model, task.injection, task.start.friction);
-        let argument = tasks.iter().find(|task| can_end(task).can_end());
         let mut flight = Self {
             simd,
             span,
             tasks,
             ends_s: span.ends_s(),
             next_task: 0,
+            steps: 0,
             lanes: Vec::new(),
             results: tasks.iter().map(|_| None).collect(),
-            argument: argument.map(|task| task.model.friction_argument()),
+            argument: tasks.first().and_then(Task::argument),
             system: System::still(simd),
             expansion: Expansion::new(simd),
             guard: GuardLanes {
@@ -101,6 +105,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             },
             step_s: splat(0.0),
             left_s: splat(f64::INFINITY),
+            ends_of_modes: Vec::new(),
             stretch: [splat(1.0); K],
         };
         for lane in 0..Lanes::<S, V>::COUNT {
@@ -124,11 +129,11 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
 
     #[inline(always)]
     fn step(&mut self) {
+        self.steps += 1;
         self.expansion.expand(&self.system);
         let mut step_s = self.choose_step();
-        let mut changes = Changes::new();
         if let Some(argument) = self.argument {
-            self.find_ends_of_modes(argument, &mut step_s, &mut changes);
+            self.find_ends_of_modes(argument, &mut step_s);
         }
         for component in 0..4 {
             if self.span.watched.turns[component] {
@@ -150,7 +155,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             }
         }
         self.left_s = self.left_s - step_s;
-        for (lane, bound) in changes.iter() {
+        while let Some((lane, bound)) = self.ends_of_modes.pop() {
             self.change_mode(lane, bound, step_s.as_slice()[lane]);
         }
         self.keep_tangents_finite();
@@ -182,12 +187,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
 
     /// Shortens the step of lanes whose friction mode ends within it.
     #[inline(always)]
-    fn find_ends_of_modes(
-        &mut self,
-        argument: usize,
-        step_s: &mut Lanes<S, V>,
-        changes: &mut Changes,
-    ) {
+    fn find_ends_of_modes(&mut self, argument: usize, step_s: &mut Lanes<S, V>) {
         let (x, force) = (&self.expansion.x[argument], self.expansion.front_force());
         let guard = &self.guard;
         let mut series = *x;
@@ -211,7 +211,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             let most_s = step_s.as_slice()[lane];
             if let Some((instant_s, bound)) = first_end(&polynomial, bounds, most_s) {
                 step_s.as_mut_slice()[lane] = instant_s;
-                changes.push(lane, bound);
+                self.ends_of_modes.push((lane, bound));
             }
         }
     }
@@ -521,6 +521,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
     fn unload(&mut self, lane: usize) {
         let x = self.state(lane);
         if let Some(mut motion) = self.lanes[lane].take() {
+            motion.found.steps = self.steps - motion.steps_before;
             motion.found.end = State {
                 x: x.into(),
                 friction: motion.mode,
@@ -560,6 +561,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         self.lanes[lane] = task.map(|task| Lane {
             task,
             index: self.next_task,
+            steps_before: self.steps,
             mode: task.start.friction,
             short_modes: 0,
             piece: 0,
@@ -568,23 +570,6 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         });
         self.next_task += 1;
         self.load_mode(lane);
-    }
-}
-
-/// Lanes whose friction mode ends in a step, each with the bound that ends it.
-struct Changes(Vec<(usize, f64)>);
-
-impl Changes {
-    fn new() -> Self {
-        Self(Vec::new())
-    }
-
-    fn push(&mut self, lane: usize, bound: f64) {
-        self.0.push((lane, bound));
-    }
-
-    fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.0.iter().copied()
     }
 }
 

@@ -6,7 +6,7 @@ use crate::motion::Diverged;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use shared_model::dither::{Application, Injection};
-use shared_model::friction::FrictionMode;
+use shared_model::friction::{FrictionMode, Sign};
 use shared_model::vehicle::{Model, State};
 use shared_model::{InvalidScenario, Scenario};
 
@@ -85,6 +85,8 @@ pub struct Found<const K: usize> {
     pub growths: Vec<Growths<K>>,
     /// Changes of friction mode.
     pub events: usize,
+    /// Steps.
+    pub steps: usize,
 }
 
 impl<const K: usize> Found<K> {
@@ -98,6 +100,7 @@ impl<const K: usize> Found<K> {
             upper: start.x.into(),
             growths: Vec::new(),
             events: 0,
+            steps: 0,
         }
     }
 
@@ -145,6 +148,15 @@ impl Task {
             start,
         })
     }
+
+    /// Index in the state of the friction law's argument, if friction has modes.
+    pub(super) fn argument(&self) -> Option<usize> {
+        let stepped = matches!(
+            self.model.friction_sign(self.injection),
+            Sign::Stepped { .. }
+        );
+        stepped.then(|| self.model.friction_argument())
+    }
 }
 
 /// Motions of scenarios from their starts, the dither averaged and on from then.
@@ -165,9 +177,18 @@ impl Motions {
 
     /// Follows all for a span, with `K` tangent vectors each, on all threads. What is found is in the scenarios' order.
     pub fn follow<const K: usize>(&self, span: &Span) -> Vec<Found<K>> {
-        let arch = Arch::new();
-        let chunks = self.tasks.par_chunks(MOTIONS_A_THREAD);
+        self.follow_by(Arch::new(), span)
+    }
+
+    /// The same with a given instruction set.
+    fn follow_by<const K: usize>(&self, arch: Arch, span: &Span) -> Vec<Found<K>> {
+        // A flight watches one argument of the friction law.
+        let alike = self.tasks.chunk_by(|a, b| a.argument() == b.argument());
+        let chunks: Vec<&[Task]> = alike
+            .flat_map(|tasks| tasks.chunks(MOTIONS_A_THREAD))
+            .collect();
         chunks
+            .par_iter()
             .flat_map_iter(|tasks| arch.dispatch(Follow { tasks, span }))
             .collect()
     }
@@ -191,5 +212,65 @@ impl<const K: usize> WithSimd for Follow<'_, K> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         Flight::<S, VECTORS, K>::new(simd, self.tasks, self.span).run()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use pulp::x86::{V3, V4};
+    use shared_model::dither::Waveform;
+
+    /// Motions of all kinds: chaos, a period, stick, rest, and one that diverges.
+    fn scenarios() -> Vec<Scenario<f64>> {
+        let scenario = |k: usize| {
+            let mut scenario = Scenario::reconstruction();
+            scenario.run.wheel_speed_rpm = 800.0 + 60.0 * k as f64;
+            scenario.run.sideslip_rad = 0.02 - 0.003 * k as f64;
+            if k % 3 == 1 {
+                scenario.dither.waveform = Waveform::Square;
+                scenario.dither.amplitude_v = 0.1;
+            }
+            if k == 7 {
+                (scenario.tires.front, scenario.tires.rear) =
+                    shared_model::tire::HIGH_FRICTION_ROAD;
+            }
+            scenario
+        };
+        (0..21).map(scenario).collect()
+    }
+
+    fn span() -> Span {
+        Span {
+            time_s: 5.0,
+            tolerance: 1e-11,
+            watched: Watched {
+                turns: [true; 4],
+                section: Some((1, 0.0)),
+            },
+            warm_up_s: 1.0,
+            pieces: 4,
+        }
+    }
+
+    /// Neither the instruction set nor the neighbours in a vector change a bit.
+    #[test]
+    fn bits_are_the_same_on_every_path_and_in_every_company() {
+        let scenarios = scenarios();
+        let motions = Motions::new(&scenarios).expect("all fit");
+        let portable = motions.follow_by::<2>(Arch::Scalar, &span());
+        let v3 = V3::try_new().map(Arch::V3);
+        let v4 = V4::try_new().map(Arch::V4);
+        for arch in [v3, v4].into_iter().flatten() {
+            assert_eq!(motions.follow_by::<2>(arch, &span()), portable, "{arch:?}");
+        }
+        let alone = |scenario: &Scenario<f64>| {
+            let motion = Motions::new(std::slice::from_ref(scenario)).expect("it fits");
+            motion.follow::<2>(&span()).remove(0)
+        };
+        assert_eq!(scenarios.iter().map(alone).collect::<Vec<_>>(), portable);
+        assert!(portable[7].diverged.is_some());
+        assert!(portable.iter().any(|found| found.events > 0));
+        assert!(portable.iter().all(|found| found.crossings.len() < 1000));
     }
 }

@@ -5,19 +5,19 @@ const NARROWEST: f64 = 1e-12;
 /// Iterations by which a bracketed root has long been found.
 const MOST_ITERATIONS: usize = 80;
 
-/// Value at `t` of the polynomial with these coefficients, the constant one first.
-pub(super) fn value(polynomial: &[f64], t: f64) -> f64 {
-    polynomial.iter().rev().fold(0.0, |sum, c| sum * t + c)
-}
-
-/// Value and derivative at `t`.
-fn value_and_slope(polynomial: &[f64], t: f64) -> (f64, f64) {
-    polynomial
-        .iter()
-        .rev()
-        .fold((0.0, 0.0), |(value, slope), c| {
-            (value * t + c, slope * t + value)
-        })
+/// Value at `t` of the polynomial with these coefficients, the constant one first. Even and odd powers on their own, which the
+/// processor adds up side by side.
+pub(super) fn value<const N: usize>(polynomial: &[f64; N], t: f64) -> f64 {
+    let square = t * t;
+    let (mut even, mut odd) = (0.0, 0.0);
+    for k in (0..N).rev() {
+        if k % 2 == 0 {
+            even = even * square + polynomial[k];
+        } else {
+            odd = odd * square + polynomial[k];
+        }
+    }
+    odd * t + even
 }
 
 /// Coefficients of the derivative.
@@ -104,13 +104,15 @@ fn halves<const N: usize>(bernstein: &[f64; N]) -> ([f64; N], [f64; N]) {
     (left, row)
 }
 
-/// The root between two signs, by Newton within its bracket and bisection where that leaves it.
-fn refine(polynomial: &[f64], from: f64, to: f64) -> f64 {
+/// The root between two signs, by Newton from the chord's root within its bracket, and bisection where that leaves it.
+fn refine<const N: usize>(polynomial: &[f64; N], from: f64, to: f64) -> f64 {
+    let rate = derivative(polynomial);
     let (mut low, mut high) = (from, to);
-    let begins_negative = value(polynomial, low) < 0.0;
-    let mut t = 0.5 * (low + high);
+    let (first, last) = (value(polynomial, low), value(polynomial, high));
+    let begins_negative = first < 0.0;
+    let mut t = low + (high - low) * (first / (first - last));
     for _ in 0..MOST_ITERATIONS {
-        let (at, slope) = value_and_slope(polynomial, t);
+        let (at, slope) = (value(polynomial, t), value(&rate, t));
         if at == 0.0 {
             return t;
         }

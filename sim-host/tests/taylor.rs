@@ -1,0 +1,235 @@
+//! The Taylor engine against the reference integrator and against the fixed-step methods.
+
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use shared_model::friction::FrictionLaw;
+use sim_host::chaos::flow::VehicleFlow;
+use sim_host::chaos::lyapunov::exponents;
+use sim_host::engine::reference::Reference;
+use sim_host::engine::taylor::{Found, Motions, Span, Unfit, Watched};
+
+fn span(time_s: f64) -> Span {
+    Span {
+        time_s,
+        tolerance: 1e-12,
+        watched: Watched::default(),
+        warm_up_s: 0.0,
+        pieces: 0,
+    }
+}
+
+fn follow<const K: usize>(scenarios: &[Scenario<f64>], span: &Span) -> Vec<Found<K>> {
+    Motions::new(scenarios).expect("all fit").follow(span)
+}
+
+fn at_speed(wheel_speed_rpm: f64) -> Scenario<f64> {
+    let mut scenario = Scenario::reconstruction();
+    scenario.run.wheel_speed_rpm = wheel_speed_rpm;
+    scenario
+}
+
+/// Every friction law and dither, at speeds from rest to chaos.
+fn scenarios() -> Vec<Scenario<f64>> {
+    let mut scenarios = Vec::new();
+    for wheel_speed_rpm in [900.0, 1500.0, 1750.0] {
+        for law in [
+            FrictionLaw::None,
+            FrictionLaw::CoulombRate,
+            FrictionLaw::PrintedAngle,
+        ] {
+            for (waveform, amplitude_v) in [
+                (Waveform::None, 0.0),
+                (Waveform::Square, 0.1),
+                (Waveform::Sine, 1.0),
+            ] {
+                let mut scenario = at_speed(wheel_speed_rpm);
+                scenario.friction.law = law;
+                scenario.dither.waveform = waveform;
+                scenario.dither.amplitude_v = amplitude_v;
+                scenarios.push(scenario);
+            }
+        }
+    }
+    // The sign function's two steps under the mean of a square wave.
+    let mut stepped = at_speed(1750.0);
+    stepped.friction.dithered = true;
+    stepped.dither.waveform = Waveform::Square;
+    stepped.dither.amplitude_v = 5e-4;
+    scenarios.push(stepped);
+    // The steering angle passes both steps.
+    stepped.friction.law = FrictionLaw::PrintedAngle;
+    stepped.dither.amplitude_v = 0.05;
+    stepped.run.steering_angle_rad = -0.1;
+    stepped.run.steering_rate_rad_per_s = 6.0;
+    scenarios.push(stepped);
+    stepped.dither.waveform = Waveform::None;
+    scenarios.push(stepped);
+    scenarios
+}
+
+#[test]
+fn motions_and_events_are_the_references() {
+    let scenarios = scenarios();
+    let found = follow::<0>(&scenarios, &span(5.0));
+    let mut events = Vec::new();
+    for (scenario, found) in scenarios.iter().zip(found) {
+        let mut reference = Reference::new(scenario, 1e-13).expect("it is valid");
+        let end = *reference.run(5.0);
+        let error = (found.end.x - end.x).amax();
+        let what = (
+            scenario.run.wheel_speed_rpm,
+            scenario.friction,
+            scenario.dither,
+        );
+        assert!(error < 2e-8, "{error}: {what:?}");
+        assert_eq!(found.end.friction, end.friction, "{what:?}");
+        assert_eq!(found.events, reference.events().len(), "{what:?}");
+        events.push(found.events);
+    }
+    assert!(events[27..].iter().all(|&events| events > 0), "{events:?}");
+}
+
+/// The error falls with the tolerance, down to rounding.
+#[test]
+fn the_tolerance_is_kept() {
+    let scenarios: Vec<_> = [1600.0, 1750.0, 1880.0].map(at_speed).into();
+    let ends: Vec<_> = scenarios
+        .iter()
+        .map(|scenario| {
+            Reference::new(scenario, 1e-14)
+                .expect("it is valid")
+                .run(3.0)
+                .x
+        })
+        .collect();
+    for tolerance in [1e-6, 1e-8, 1e-10, 1e-12] {
+        let span = Span {
+            tolerance,
+            ..span(3.0)
+        };
+        let found = follow::<0>(&scenarios, &span);
+        for (found, end) in found.iter().zip(&ends) {
+            let error = (found.end.x - end).amax();
+            assert!(error < 1e3 * tolerance, "{error} for {tolerance}");
+        }
+    }
+}
+
+/// Turning points: the rate is zero there, and no sample in between lies beyond them.
+#[test]
+fn turning_points_and_extents_are_exact() {
+    let scenario = at_speed(1750.0);
+    let span = Span {
+        watched: Watched {
+            turns: [true; 4],
+            section: Some((1, 0.1)),
+        },
+        ..span(8.0)
+    };
+    let found = follow::<0>(&[scenario], &span).remove(0);
+    let mut reference = Reference::new(&scenario, 1e-13).expect("it is valid");
+    let (mut lower, mut upper) = (reference.state().x, reference.state().x);
+    let (mut crossings, mut maxima) = (0, 0);
+    let mut before = (reference.state().x[1], f64::NEG_INFINITY);
+    for _ in 0..80_000 {
+        let x = reference.run(1e-4).x;
+        (lower, upper) = (lower.zip_map(&x, f64::min), upper.zip_map(&x, f64::max));
+        crossings += usize::from((before.0 < 0.1) != (x[1] < 0.1));
+        maxima += usize::from(before.1 > 0.0 && x[1] < before.0);
+        before = (x[1], x[1] - before.0);
+    }
+    for i in 0..4 {
+        // Samples a ten-thousandth of a second apart miss the extremes by 1e-6 at most, and a kink by more.
+        let miss = if i == 3 { 1e-2 } else { 1e-6 };
+        assert!(
+            found.lower[i] <= lower[i] + 1e-9 && lower[i] - found.lower[i] < miss,
+            "{i}"
+        );
+        assert!(
+            found.upper[i] >= upper[i] - 1e-9 && found.upper[i] - upper[i] < miss,
+            "{i}"
+        );
+    }
+    assert_eq!(found.crossings.len(), crossings);
+    for crossing in &found.crossings {
+        assert!((crossing.x[1] - 0.1).abs() < 1e-14);
+    }
+    let pairs = found.turns[1].windows(2);
+    let falls = pairs.filter(|pair| pair[1].1 < pair[0].1).count();
+    assert!(falls.abs_diff(maxima) <= 1, "{falls} {maxima}");
+}
+
+/// Largest exponent and spectrum against dual numbers through the fixed step.
+#[test]
+fn exponents_are_those_of_the_fixed_step() {
+    for law in [FrictionLaw::None, FrictionLaw::CoulombRate] {
+        let mut scenario = at_speed(1750.0);
+        scenario.friction.law = law;
+        let time_s = 400.0;
+        let span = Span {
+            warm_up_s: 0.1 * time_s,
+            pieces: 128,
+            ..span(time_s)
+        };
+        let motions = Motions::new(&[scenario]).expect("it fits");
+        let mean = |growths: Vec<f64>| growths.iter().sum::<f64>() / (0.9 * time_s);
+        let largest = mean(
+            motions.follow::<1>(&span)[0]
+                .growths
+                .iter()
+                .map(|g| g[0])
+                .collect(),
+        );
+        let spectrum = &motions.follow::<4>(&span)[0].growths;
+        let spectrum: Vec<f64> = (0..4)
+            .map(|k| mean(spectrum.iter().map(|g| g[k]).collect()))
+            .collect();
+        let flow = VehicleFlow::new(&scenario).expect("it is valid");
+        let wanted = exponents::<4, 4>(&flow, &flow.start(), time_s).expect("long enough");
+        for (k, wanted) in wanted.iter().enumerate() {
+            let found = spectrum[k];
+            match wanted {
+                Some(wanted) => {
+                    let error = 3.0 * wanted.standard_error_per_s + wanted.resolution_per_s;
+                    assert!(
+                        (found - wanted.per_s).abs() < error,
+                        "{found} {wanted} of {k}"
+                    );
+                }
+                None => assert_eq!(found, f64::NEG_INFINITY),
+            }
+        }
+        assert!(
+            (largest - spectrum[0]).abs() < 1e-9,
+            "{largest} {}",
+            spectrum[0]
+        );
+    }
+}
+
+/// Without friction the sum of all exponents is the mean of the divergence, which the frame's volume must follow exactly.
+#[test]
+fn the_largest_exponent_alone_and_in_the_spectrum_are_one() {
+    let mut scenario = at_speed(1845.0);
+    scenario.friction.law = FrictionLaw::None;
+    let span = Span {
+        warm_up_s: 1.0,
+        pieces: 8,
+        ..span(20.0)
+    };
+    let motions = Motions::new(&[scenario]).expect("it fits");
+    let one = &motions.follow::<1>(&span)[0].growths;
+    let all = &motions.follow::<4>(&span)[0].growths;
+    for (one, all) in one.iter().zip(all) {
+        assert!((one[0] - all[0]).abs() < 1e-6, "{one:?} {all:?}");
+    }
+}
+
+#[test]
+fn what_does_not_fit_is_said() {
+    let mut scenario = at_speed(1750.0);
+    scenario.vehicle.slip_form = shared_model::vehicle::SlipForm::Exact;
+    assert_eq!(Motions::new(&[scenario]).err(), Some(Unfit::NotPolynomial));
+    scenario.run.wheel_speed_rpm = f64::NAN;
+    assert!(matches!(Motions::new(&[scenario]), Err(Unfit::Invalid(_))));
+}
