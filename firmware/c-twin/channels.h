@@ -14,6 +14,7 @@ static inline bool channels_agree(const void *a, const void *b, size_t bytes)
 {
     const memory_word *left = a, *right = b;
 
+    #pragma GCC unroll 8
     for (size_t i = 0; i < bytes / sizeof *left; i++)
         if (left[i] != right[i])
             return false;
