@@ -12,6 +12,7 @@ use shared_model::tire::TireModel;
 use shared_model::vehicle::{SlipForm, State};
 
 /// A call that is counted: task, input, output.
+// SAFETY: a type; whoever calls says why it may.
 pub type Call = unsafe extern "C" fn(*mut c_void, *const c_void, *mut c_void);
 
 /// What a scenario may choose.
