@@ -27,8 +27,11 @@ const OVERWRITE: &str = "DITHERSTEER_OVERWRITE_EXPECTED";
 /// Builds both, and compares their bits and instructions, or records the latter.
 pub fn run(overwrite_expected: bool) -> Result<()> {
     if !has_c_compiler() {
-        let line = Manager::of_this_machine().map_or("install it", Manager::arm_gcc_line);
-        bail!("{C_COMPILER} is missing: type `{line}`, then run this again");
+        let cure = Manager::of_this_machine().map_or_else(
+            || "install GCC and newlib for arm-none-eabi".to_owned(),
+            |manager| format!("type `{}`", manager.arm_gcc_line()),
+        );
+        bail!("{C_COMPILER} is missing: {cure}, then run this again");
     }
     let toolchain = stage("set-up", setup::tools)?;
     build(&toolchain)?;
