@@ -91,6 +91,10 @@ impl Real for f32 {
     fn oscillator_sin(self) -> Self {
         micromath::F32(self).sin().0
     }
+    // One instruction.
+    fn abs(self) -> Self {
+        f32::abs(self)
+    }
     // The default goes through f64, which the ECU would emulate in software.
     fn is_finite(self) -> bool {
         f32::is_finite(self)

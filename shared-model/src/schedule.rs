@@ -91,8 +91,9 @@ pub fn amplitude_v<T: Real>(
         return T::zero();
     }
     let below = place.to_u32() as usize;
-    let at = |k: usize| amplitudes_v.get(k).or(amplitudes_v.last()).copied();
-    let (lower, upper) = (at(below), at(below.saturating_add(1)));
-    let (lower, upper) = (lower.unwrap_or(T::zero()), upper.unwrap_or(T::zero()));
-    if upper > lower { upper } else { lower }
+    match amplitudes_v.get(below..) {
+        Some([lower, upper, ..]) if upper > lower => *upper,
+        Some([lower, ..]) => *lower,
+        _ => amplitudes_v.last().copied().unwrap_or(T::zero()),
+    }
 }

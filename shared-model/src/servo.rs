@@ -60,9 +60,8 @@ impl<T: Real> ParameterSet<T> for Servo<T> {
     ];
 }
 
-/// Duty cycle as the timer has it: `code` counts high out of `period`. The code is never above the period. Duties of one
-/// period are ordered by their code.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+/// Duty cycle as the timer has it: `code` counts high out of `period`. The code is never above the period.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Duty {
     code: u16,
     period: u16,
@@ -115,6 +114,23 @@ impl Duty {
     /// Counts of a carrier period.
     pub fn period(self) -> u16 {
         self.period
+    }
+
+    /// The middle one of this and two others of the same period.
+    ///
+    /// ```
+    /// use shared_model::servo::Duty;
+    /// let [low, middle, high] = [700, 1250, 1800].map(|code| Duty::new(code, 2500).unwrap());
+    /// assert_eq!(middle.median(high, low), middle);
+    /// assert_eq!(middle.median(high, high), high);
+    /// ```
+    #[must_use]
+    pub fn median(self, a: Self, b: Self) -> Self {
+        let (low, high) = (a.code.min(b.code), a.code.max(b.code));
+        Self {
+            code: self.code.max(low).min(high),
+            period: self.period,
+        }
     }
 }
 

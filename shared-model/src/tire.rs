@@ -56,6 +56,20 @@ impl<T: Real> MagicFormula<T> {
         }
     }
 
+    /// Cornering force with the dither ahead of it: its mean by quadrature of (23).
+    // Out of line: it is long, and would keep the cubic tyre's few instructions from being put where they are needed.
+    #[inline(never)]
+    fn dithered_force(&self, mean: &SineMean<T>, alpha: T, injection: Injection<T>) -> T {
+        match injection {
+            Injection::Off => self.force(alpha),
+            Injection::Shift { offset } => self.force(alpha + offset),
+            Injection::SquareMean { amplitude } => {
+                T::from_f64(0.5) * (self.force(alpha + amplitude) + self.force(alpha - amplitude))
+            }
+            Injection::SineMean { amplitude } => mean.of(|a| self.force(a), alpha, amplitude),
+        }
+    }
+
     /// The same coefficients in another arithmetic.
     pub fn map<U>(&self, f: &impl Fn(T) -> U) -> MagicFormula<U> {
         MagicFormula {
@@ -125,6 +139,15 @@ impl<T: Real> CubicTire<T> {
         alpha * (self.linear_n_per_rad - self.cubic_n_per_rad3 * alpha * alpha)
     }
 
+    /// Cornering force with the dither ahead of it: its mean in closed form.
+    #[inline(always)]
+    fn dithered_force(&self, alpha: T, injection: Injection<T>) -> T {
+        match injection {
+            Injection::Shift { offset } => self.force(alpha + offset),
+            _ => self.averaged(injection).force(alpha),
+        }
+    }
+
     /// The same coefficients in another arithmetic.
     pub fn map<U>(&self, f: &impl Fn(T) -> U) -> CubicTire<U> {
         CubicTire {
@@ -134,6 +157,7 @@ impl<T: Real> CubicTire<T> {
     }
 
     /// The tyre that a slip angle meets on average under the mean of a dither; a held sample moves the slip angle instead.
+    #[inline(always)]
     pub fn averaged(&self, injection: Injection<T>) -> Self {
         match injection {
             Injection::Off | Injection::Shift { .. } => *self,
@@ -203,21 +227,11 @@ impl<T: Real> Tire<T> {
 
     /// Cornering force (N) at slip angle `alpha` (rad), with the dither ahead of the nonlinearity: closed form for the
     /// cubic tyre, quadrature of (23) for the Magic Formula.
+    #[inline(always)]
     pub fn force(&self, alpha: T, injection: Injection<T>) -> T {
         match self {
-            Self::Cubic(tire) => match injection {
-                Injection::Shift { offset } => tire.force(alpha + offset),
-                _ => tire.averaged(injection).force(alpha),
-            },
-            Self::MagicFormula(tire, mean) => match injection {
-                Injection::Off => tire.force(alpha),
-                Injection::Shift { offset } => tire.force(alpha + offset),
-                Injection::SquareMean { amplitude } => {
-                    T::from_f64(0.5)
-                        * (tire.force(alpha + amplitude) + tire.force(alpha - amplitude))
-                }
-                Injection::SineMean { amplitude } => mean.of(|a| tire.force(a), alpha, amplitude),
-            },
+            Self::Cubic(tire) => tire.dithered_force(alpha, injection),
+            Self::MagicFormula(tire, mean) => tire.dithered_force(mean, alpha, injection),
         }
     }
 }

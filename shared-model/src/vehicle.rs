@@ -291,6 +291,7 @@ impl<T: Real> Model<T> {
     }
 
     /// Cornering forces of the front and rear tyres, N, with the dither ahead of them.
+    #[inline(always)]
     pub fn cornering_forces(&self, x: &Vector4<T>, injection: Injection<T>) -> (T, T) {
         let (front, rear) = self.slip_angles(x);
         (
@@ -306,6 +307,7 @@ impl<T: Real> Model<T> {
     }
 
     /// Time derivative of the state vector, equation (14) with (24)'s effective nonlinearities, friction in `mode`.
+    #[inline(always)]
     pub fn derivative(
         &self,
         x: &Vector4<T>,

@@ -60,6 +60,19 @@ impl Manager {
         }
     }
 
+    /// The one line to type for the C compiler of Cortex-M.
+    pub fn arm_gcc_line(self) -> &'static str {
+        match self {
+            Self::Apt => {
+                "sudo apt-get update && sudo apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi"
+            }
+            Self::Dnf => "sudo dnf install arm-none-eabi-gcc-cs arm-none-eabi-newlib",
+            Self::Pacman => "sudo pacman -S arm-none-eabi-gcc arm-none-eabi-newlib",
+            Self::Brew => "brew install --cask gcc-arm-embedded",
+            Self::Winget => "winget install Arm.GnuArmEmbeddedToolchain",
+        }
+    }
+
     /// The one line to type for QEMU.
     pub fn qemu_line(self) -> &'static str {
         match self {
@@ -211,7 +224,11 @@ mod tests {
     #[test]
     fn every_manager_names_itself_in_its_line() {
         for manager in MANAGERS {
-            for line in [manager.qemu_line(), manager.python_line()] {
+            for line in [
+                manager.qemu_line(),
+                manager.python_line(),
+                manager.arm_gcc_line(),
+            ] {
                 assert!(line.contains(manager.program()), "{manager:?}");
             }
         }

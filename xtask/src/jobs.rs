@@ -7,6 +7,7 @@ pub mod lint;
 pub mod mutants;
 pub mod proofs;
 pub mod setup;
+pub mod target_cost;
 pub mod test;
 
 use std::time::Instant;

@@ -83,6 +83,17 @@ enum Command {
         overwrite_expected: bool,
     },
 
+    /// Counts the instructions of the model's step and the ECU's tasks on the target, and of the same in C by GCC -O3.
+    ///
+    /// Fails if a bit of their outputs differs, or if Rust takes more. Needs arm-none-eabi-gcc; says what to install where it is
+    /// missing.
+    #[command(after_help = "Example:\n  cargo xtask target-cost")]
+    TargetCost {
+        /// Write the figures into tests/golden/cost.txt instead of comparing them; the limit holds all the same.
+        #[arg(long)]
+        overwrite_expected: bool,
+    },
+
     /// Checks the format, and runs clippy on host and firmware; warnings are errors.
     #[command(after_help = "Example:\n  cargo xtask lint")]
     Lint,
@@ -120,6 +131,7 @@ fn main() -> ExitCode {
         Command::Demo { args } => jobs::demo::run(&args),
         Command::Test => jobs::test::run(),
         Command::Proofs { overwrite_expected } => jobs::proofs::run(overwrite_expected),
+        Command::TargetCost { overwrite_expected } => jobs::target_cost::run(overwrite_expected),
         Command::Lint => jobs::lint::run(),
         Command::Firmware { board } => jobs::firmware::run(&board),
         Command::Coverage => jobs::coverage::run(),

@@ -37,6 +37,10 @@ impl Warning {
         Self::FramesLost,
     ];
 
+    fn bit(self) -> u16 {
+        1 << self as u16
+    }
+
     /// Its name, for reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -121,7 +125,7 @@ impl<T: Real> Channel<T> {
             motor_voltage_v: setpoint.motor_v,
             dither_amplitude_v: setpoint.dither_amplitude_v,
             wheel_speed_limit_rpm: self.supervisor.wheel_speed_limit_rpm(),
-            warnings: warning(status).map_or(0, |warning| 1 << warning as u16),
+            warnings: warnings(status),
             sensor_counter: self.counter,
         };
         (setpoint, actuation)
@@ -140,14 +144,15 @@ impl<T: Real> Channel<T> {
     }
 }
 
-fn warning(status: Status) -> Option<Warning> {
+/// The bit of what was tolerated.
+fn warnings(status: Status) -> u16 {
     match status {
-        Status::Ok => None,
-        Status::OkSomeLost => Some(Warning::FramesLost),
-        Status::NoNewData => Some(Warning::FrameMissing),
-        Status::Error => Some(Warning::FrameDamaged),
-        Status::Repeated => Some(Warning::FrameRepeated),
-        Status::WrongSequence => Some(Warning::FrameSequence),
+        Status::Ok => 0,
+        Status::OkSomeLost => Warning::FramesLost.bit(),
+        Status::NoNewData => Warning::FrameMissing.bit(),
+        Status::Error => Warning::FrameDamaged.bit(),
+        Status::Repeated => Warning::FrameRepeated.bit(),
+        Status::WrongSequence => Warning::FrameSequence.bit(),
     }
 }
 
@@ -176,22 +181,29 @@ impl<T: Real> ControlTask<T> {
     /// A control tick.
     pub fn run(&mut self, input: &ControlInput) -> ControlOutput<T> {
         let mut found_outside = input.found_by_pwm;
-        let differ = self.frames_differed || !self.channels.agrees();
-        found_outside.add_if(differ, Fault::ChannelsDiffer);
-        let [(setpoint_a, told_a), (setpoint_b, told_b)] = self
-            .channels
-            .run(|channel| channel.run(input, found_outside));
+        let channels_differ = self.frames_differed || !self.channels.agrees();
+        found_outside.add_if(channels_differ, Fault::ChannelsDiffer);
+        let [a, b] = self.channels.both();
+        let (setpoint_a, told_a) = a.run(input, found_outside);
+        let (setpoint_b, told_b) = b.run(input, found_outside);
         let pairs = [(told_a, told_b), (told_b, told_a)];
         let [(actuation, frame), (_, other_frame)] = self
             .channels
             .run_each(&pairs, |channel, (own, other)| channel.tell(own, other));
-        self.frames_differed = frame != other_frame;
+        self.frames_differed = differ(&frame, &other_frame);
         ControlOutput {
             setpoints: [setpoint_a, setpoint_b],
             frame,
             actuation,
         }
     }
+}
+
+/// Word by word: on the target `==` on arrays calls a function that takes them byte by byte.
+fn differ(a: &FrameBytes, b: &FrameBytes) -> bool {
+    let (a, _) = a.as_chunks::<4>();
+    let (b, _) = b.as_chunks::<4>();
+    a.iter().ne(b)
 }
 
 /// The lower of two numbers, or the one that is finite.
@@ -287,6 +299,17 @@ mod tests {
         assert!(!task.frames_differed);
         task.frames_differed = true;
         assert_found(task, "frame", 0);
+    }
+
+    #[test]
+    fn frames_differ_in_any_bit() {
+        let frame: FrameBytes = core::array::from_fn(|place| 7 * place as u8);
+        assert!(!differ(&frame, &frame));
+        for (place, bit) in (0..frame.len()).flat_map(|place| (0..8).map(move |bit| (place, bit))) {
+            let mut other = frame;
+            other[place] ^= 1 << bit;
+            assert!(differ(&frame, &other), "byte {place}, bit {bit}");
+        }
     }
 
     #[test]

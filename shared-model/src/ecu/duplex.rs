@@ -20,6 +20,11 @@ impl<C: Copy + PartialEq> Duplex<C> {
         self.0[0] == self.0[1]
     }
 
+    /// Both channels.
+    pub fn both(&mut self) -> &mut [C; 2] {
+        &mut self.0
+    }
+
     /// Runs both channels.
     pub fn run<O>(&mut self, mut f: impl FnMut(&mut C) -> O) -> [O; 2] {
         let [a, b] = &mut self.0;

@@ -60,18 +60,19 @@ impl<T: Real> Limiter<T> {
         let amplitude_v = setpoint.dither_amplitude_v;
         // False for NaN.
         let is_within = dither_v.abs() <= amplitude_v * (T::one() + self.sample_error);
+        let volts = setpoint.motor_v + if is_within { dither_v } else { T::zero() };
         self.faults.add_if(!is_within, Fault::DitherAmplitude);
-        self.half_period = if amplitude_v == T::zero() {
-            None
+        if amplitude_v == T::zero() {
+            self.half_period = None;
         } else {
-            Some(self.next_half_period(dither_v, amplitude_v))
-        };
-        setpoint.motor_v + if is_within { dither_v } else { T::zero() }
+            self.judge_half_period(dither_v, amplitude_v);
+        }
+        volts
     }
 
-    fn next_half_period(&mut self, dither_v: T, amplitude_v: T) -> HalfPeriod {
+    fn judge_half_period(&mut self, dither_v: T, amplitude_v: T) {
         let (least, most) = self.half_period_samples;
-        let now = self.half_period.unwrap_or(HalfPeriod {
+        let now = self.half_period.get_or_insert(HalfPeriod {
             is_positive: dither_v > T::zero(),
             samples: 0,
             is_whole: false,
@@ -83,18 +84,19 @@ impl<T: Real> Limiter<T> {
         } else {
             dither_v > sure_v
         };
-        if has_changed {
+        let is_wrong = if has_changed {
             let is_short = now.is_whole && now.samples < least;
-            self.faults.add_if(is_short, Fault::DitherFrequency);
-            return HalfPeriod {
+            *now = HalfPeriod {
                 is_positive: !now.is_positive,
                 samples: 1,
                 is_whole: true,
             };
-        }
-        let samples = now.samples.saturating_add(1);
-        self.faults.add_if(samples > most, Fault::DitherFrequency);
-        HalfPeriod { samples, ..now }
+            is_short
+        } else {
+            now.samples = now.samples.saturating_add(1);
+            now.samples > most
+        };
+        self.faults.add_if(is_wrong, Fault::DitherFrequency);
     }
 
     /// The duty code that is put out.

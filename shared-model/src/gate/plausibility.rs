@@ -34,6 +34,11 @@ impl<T: Real> Plausibility<T> {
         }
     }
 
+    /// The limits that it holds measurements against, and all others.
+    pub fn limits(&self) -> &Limits<T> {
+        &self.limits
+    }
+
     /// A control tick; `measurement` is new, or `None` if there was none. Returns what is wrong with it.
     pub fn check(&mut self, measurement: Option<&Measurement<T>>) -> Faults {
         self.ticks += T::one();
@@ -126,10 +131,12 @@ fn signals<T: Real>(measurement: &Measurement<T>) -> [T; 5] {
     ]
 }
 
-/// Finite, and zero or of a size that a sensor can have.
+/// Zero, or of a size that a sensor can have: neither subnormal nor infinite in a frame's f32. False for NaN.
 fn is_a_number<T: Real>(value: T) -> bool {
-    let normal = value.abs() >= T::from_f64(f64::from(f32::MIN_POSITIVE));
-    value.is_finite() && (normal || value == T::zero())
+    let least = T::from_f64(f64::from(f32::MIN_POSITIVE));
+    let most = T::from_f64(f64::from(f32::MAX));
+    let size = value.abs();
+    size <= most && (size >= least || size == T::zero())
 }
 
 /// Magnitude at most `bound`; false for NaN.

@@ -1,7 +1,7 @@
 //! The gate at the control rate: sensors, time, and the controller's command.
 
 use super::plausibility::Plausibility;
-use super::{Fault, Faults, Limits, Setpoint};
+use super::{Fault, Faults, Setpoint};
 use crate::Real;
 use crate::dither::Waveform;
 use crate::scenario::Scenario;
@@ -37,7 +37,6 @@ struct Most<T> {
 /// The gate at the control rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervisor<T> {
-    limits: Limits<T>,
     plausibility: Plausibility<T>,
     /// What a command may be at most, rounding included.
     most: Most<T>,
@@ -70,7 +69,6 @@ impl<T: Real> Supervisor<T> {
         let counts = T::from_u32(clock_hz) * period_s;
         let tolerance = limits.tick_tolerance * counts;
         Self {
-            limits,
             plausibility: Plausibility::new(&limits, period_s, speed_per_rpm),
             most: Most {
                 motor_v: limits.motor_voltage_v * (T::one() + rounding),
@@ -183,9 +181,10 @@ impl<T: Real> Supervisor<T> {
 
     /// Wheel speed that the vehicle must not exceed, rpm.
     pub fn wheel_speed_limit_rpm(&self) -> T {
+        let limits = self.plausibility.limits();
         match self.mode {
-            Mode::Active => self.limits.wheel_speed_rpm,
-            Mode::Starting | Mode::Safe => self.limits.safe_wheel_speed_rpm,
+            Mode::Active => limits.wheel_speed_rpm,
+            Mode::Starting | Mode::Safe => limits.safe_wheel_speed_rpm,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 
-use super::{proofs, stage};
+use super::{proofs, stage, target_cost};
 use crate::outcome::Exit;
 use crate::{process, rustup, setup, workspace};
 
@@ -17,6 +17,9 @@ pub fn run() -> Result<()> {
     // Before any test: a comparison that would be left out is no pass.
     stage("Python packages of the tests", setup::python::ensure)?;
     proofs::build(&toolchain)?;
+    if target_cost::has_c_compiler() {
+        target_cost::build(&toolchain)?;
+    }
     stage("build of the model's tests", || {
         cargo_test(&MODEL, &["--no-run"])
     })?;

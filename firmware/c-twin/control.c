@@ -1,0 +1,543 @@
+/* The task at the control rate: shared-model/src/ecu/control.rs with end-to-end protection, frames, controller and gate. */
+
+#include "channels.h"
+#include "gate.h"
+#include "twin.h"
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#define CONTROL_RATE_HZ 1000.0f
+#define SENSOR_DATA_ID 0x5A01
+#define ACTUATOR_DATA_ID 0x5A02
+#define MAX_DELTA_COUNTER 3
+#define ROUNDING 1e-6f
+
+enum mode { MODE_STARTING, MODE_ACTIVE, MODE_SAFE };
+
+enum reception { RECEIVED, RECEIVED_SOME_LOST, NOTHING_NEW, DAMAGED, REPEATED, WRONG_SEQUENCE };
+
+enum warning { FRAME_MISSING, FRAME_DAMAGED, FRAME_REPEATED, FRAME_SEQUENCE, FRAMES_LOST };
+
+struct measurement {
+    float wheel_speed_rpm;
+    float yaw_rate_rad_per_s;
+    float steering_angle_rad;
+    float steering_rate_rad_per_s;
+    float current_request_a;
+};
+
+struct policy {
+    float dither_off_below_rpm;
+    float hysteresis_rpm;
+    float dither_ramp_s;
+    float motor_current_a;
+    float motor_slew_a_per_s;
+};
+
+struct controller {
+    struct policy policy;
+    float schedule_first_rpm;
+    float schedule_step_rpm;
+    float schedule_amplitudes_v[SCHEDULE_POINTS];
+    float winding_resistance_ohm;
+    float period_s;
+    float amplitude_v;
+    float amplitude_step_v;
+    float motor_current_a;
+    uint32_t ticks_to_dither;
+    uint32_t dither_on;
+};
+
+struct limits {
+    float motor_voltage_v;
+    float motor_slew_v_per_s;
+    float square_amplitude_v;
+    float sine_amplitude_v;
+    float dither_frequency_min_rad_per_s;
+    float dither_frequency_max_rad_per_s;
+    float ramp_out_s;
+    float safe_wheel_speed_rpm;
+    float wheel_speed_rpm;
+    float wheel_acceleration_rpm_per_s;
+    float yaw_rate_rad_per_s;
+    float yaw_acceleration_rad_per_s2;
+    float steering_angle_rad;
+    float steering_angle_change_rad_per_s;
+    float steering_rate_rad_per_s;
+    float steering_acceleration_rad_per_s2;
+    float current_request_a;
+    float lateral_acceleration_m_per_s2;
+    float steering_contradiction_rad;
+    float steering_memory_s;
+    float stuck_steering_rad;
+    float stuck_wheel_speed_rpm;
+    float frame_age_s;
+    float tick_tolerance;
+};
+
+struct plausibility {
+    float control_period_s;
+    float speed_per_rpm;
+    struct measurement last;
+    uint32_t has_last;
+    float ticks;
+    float contradiction_rad;
+    float unanswered_steering_rad;
+};
+
+struct supervisor {
+    struct limits limits;
+    struct plausibility plausibility;
+    float most_motor_v;
+    float most_motor_change_v;
+    float most_dither_amplitude_v;
+    float slew_v;
+    float ramp_v;
+    uint32_t window_least_counts;
+    uint32_t window_most_counts;
+    uint32_t frame_age_ticks;
+    uint32_t ticks_since_frame;
+    enum mode mode;
+    uint32_t faults;
+    struct twin_setpoint setpoint;
+};
+
+struct channel {
+    struct measurement measurement;
+    uint32_t has_measurement;
+    struct controller controller;
+    struct supervisor supervisor;
+    uint8_t received_counter;
+    uint8_t valid_counter;
+    uint8_t sent_counter;
+};
+
+struct task {
+    struct channel channels[2];
+    bool frames_differed;
+};
+
+/* Table of the polynomial 0x1021, filled at set-up. */
+static uint16_t crc_table[256];
+
+static inline uint16_t crc_byte(uint16_t crc, uint8_t byte)
+{
+    return (uint16_t)(crc << 8) ^ crc_table[(crc >> 8) ^ byte];
+}
+
+/* Of the frame behind the checksum's own bytes, then of the data ID. */
+static inline uint16_t checksum(const uint8_t *frame, uint16_t data_id)
+{
+    uint16_t crc = 0xFFFF;
+
+    for (int i = 2; i < FRAME_LEN; i++)
+        crc = crc_byte(crc, frame[i]);
+    crc = crc_byte(crc, data_id & 0xFF);
+    return crc_byte(crc, data_id >> 8);
+}
+
+static inline enum reception receive(struct channel *channel, const struct twin_control_input *input)
+{
+    const uint8_t *frame = input->frame;
+
+    if (!input->has_frame)
+        return NOTHING_NEW;
+    if ((uint16_t)(frame[0] | frame[1] << 8) != checksum(frame, SENSOR_DATA_ID))
+        return DAMAGED;
+    const uint8_t delta = frame[2] - channel->received_counter;
+    channel->received_counter = frame[2];
+    if (delta == 0)
+        return REPEATED;
+    if (delta == 1)
+        return RECEIVED;
+    return delta <= MAX_DELTA_COUNTER ? RECEIVED_SOME_LOST : WRONG_SEQUENCE;
+}
+
+static inline uint16_t warnings(enum reception reception)
+{
+    switch (reception) {
+    case RECEIVED_SOME_LOST:
+        return 1 << FRAMES_LOST;
+    case NOTHING_NEW:
+        return 1 << FRAME_MISSING;
+    case DAMAGED:
+        return 1 << FRAME_DAMAGED;
+    case REPEATED:
+        return 1 << FRAME_REPEATED;
+    case WRONG_SEQUENCE:
+        return 1 << FRAME_SEQUENCE;
+    default:
+        return 0;
+    }
+}
+
+/* The larger of the amplitudes at both neighbouring speeds. */
+static inline float scheduled_v(const struct controller *controller, float speed_rpm)
+{
+    const float place = (speed_rpm - controller->schedule_first_rpm) / controller->schedule_step_rpm;
+
+    if (!(place >= 0.0f && isfinite(speed_rpm)))
+        return 0.0f;
+    const float last = (float)(SCHEDULE_POINTS - 1);
+    if (place >= last)
+        return controller->schedule_amplitudes_v[SCHEDULE_POINTS - 1];
+    const uint32_t below = (uint32_t)place;
+    const float lower = controller->schedule_amplitudes_v[below];
+    const float upper = controller->schedule_amplitudes_v[below + 1];
+    return upper > lower ? upper : lower;
+}
+
+static inline float towards(float value, float target, float step)
+{
+    if (target > value + step)
+        return value + step;
+    if (target < value - step)
+        return value - step;
+    return target;
+}
+
+static inline float limited(float value, float limit)
+{
+    if (value > limit)
+        return limit;
+    if (value < -limit)
+        return -limit;
+    return value;
+}
+
+static inline void switch_dither(struct controller *controller, float speed_rpm)
+{
+    const float off_below = controller->policy.dither_off_below_rpm;
+
+    if (controller->ticks_to_dither > 0)
+        controller->ticks_to_dither--;
+    else if (speed_rpm < off_below)
+        controller->dither_on = false;
+    else if (speed_rpm >= off_below + controller->policy.hysteresis_rpm)
+        controller->dither_on = true;
+}
+
+static inline struct twin_setpoint controller_run(struct controller *controller, const struct measurement *now)
+{
+    switch_dither(controller, now->wheel_speed_rpm);
+    const float wanted_v = controller->dither_on ? scheduled_v(controller, now->wheel_speed_rpm) : 0.0f;
+    controller->amplitude_v = towards(controller->amplitude_v, wanted_v, controller->amplitude_step_v);
+    const float request = limited(now->current_request_a, controller->policy.motor_current_a);
+    const float slew = controller->policy.motor_slew_a_per_s * controller->period_s;
+    controller->motor_current_a = towards(controller->motor_current_a, request, slew);
+    return (struct twin_setpoint){ controller->motor_current_a * controller->winding_resistance_ohm,
+                                   controller->amplitude_v };
+}
+
+/* Magnitude at most bound; false for NaN. */
+static inline bool is_within(float value, float bound)
+{
+    return fabsf(value) <= bound;
+}
+
+/* Finite, and zero or of a size that a sensor can have. */
+static inline bool is_a_number(float value)
+{
+    return isfinite(value) && (fabsf(value) >= FLT_MIN || value == 0.0f);
+}
+
+static inline uint32_t compare(struct plausibility *plausibility, const struct limits *limits,
+                               const struct measurement *now)
+{
+    const struct measurement *last = &plausibility->last;
+    const float time_s = plausibility->ticks * plausibility->control_period_s;
+    const bool all_slow =
+        is_within(now->wheel_speed_rpm - last->wheel_speed_rpm, limits->wheel_acceleration_rpm_per_s * time_s) &&
+        is_within(now->yaw_rate_rad_per_s - last->yaw_rate_rad_per_s, limits->yaw_acceleration_rad_per_s2 * time_s) &&
+        is_within(now->steering_angle_rad - last->steering_angle_rad,
+                  limits->steering_angle_change_rad_per_s * time_s) &&
+        is_within(now->steering_rate_rad_per_s - last->steering_rate_rad_per_s,
+                  limits->steering_acceleration_rad_per_s2 * time_s);
+    const float moved_rad = now->steering_angle_rad - last->steering_angle_rad;
+    const float mean_rate = 0.5f * (now->steering_rate_rad_per_s + last->steering_rate_rad_per_s);
+    const float memory_s = limits->steering_memory_s;
+    const float kept = memory_s / (memory_s + time_s);
+    const bool is_answered = now->yaw_rate_rad_per_s != last->yaw_rate_rad_per_s;
+    const bool can_answer = now->wheel_speed_rpm > limits->stuck_wheel_speed_rpm;
+
+    plausibility->contradiction_rad = plausibility->contradiction_rad * kept + moved_rad - mean_rate * time_s;
+    if (is_answered || !can_answer)
+        plausibility->unanswered_steering_rad = 0.0f;
+    else
+        plausibility->unanswered_steering_rad += moved_rad;
+
+    return fault_if(!all_slow, FAULT_SENSOR_RATE) |
+           fault_if(!is_within(plausibility->contradiction_rad, limits->steering_contradiction_rad),
+                    FAULT_STEERING_INCONSISTENT) |
+           fault_if(!is_within(plausibility->unanswered_steering_rad, limits->stuck_steering_rad), FAULT_SENSOR_STUCK);
+}
+
+static inline uint32_t check_measurement(struct plausibility *plausibility, const struct limits *limits,
+                                         const struct measurement *now)
+{
+    plausibility->ticks += 1.0f;
+    if (!now)
+        return 0;
+    if (!(is_a_number(now->wheel_speed_rpm) && is_a_number(now->yaw_rate_rad_per_s) &&
+          is_a_number(now->steering_angle_rad) && is_a_number(now->steering_rate_rad_per_s) &&
+          is_a_number(now->current_request_a)))
+        return 1u << FAULT_SENSOR_NOT_A_NUMBER;
+
+    const bool in_range = now->wheel_speed_rpm >= 0.0f && now->wheel_speed_rpm <= limits->wheel_speed_rpm &&
+                          is_within(now->yaw_rate_rad_per_s, limits->yaw_rate_rad_per_s) &&
+                          is_within(now->steering_angle_rad, limits->steering_angle_rad) &&
+                          is_within(now->steering_rate_rad_per_s, limits->steering_rate_rad_per_s) &&
+                          is_within(now->current_request_a, limits->current_request_a);
+    const float acceleration = now->wheel_speed_rpm * plausibility->speed_per_rpm * now->yaw_rate_rad_per_s;
+    uint32_t faults = fault_if(!in_range, FAULT_SENSOR_RANGE) |
+                      fault_if(!is_within(acceleration, limits->lateral_acceleration_m_per_s2),
+                               FAULT_LATERAL_ACCELERATION);
+    if (plausibility->has_last)
+        faults |= compare(plausibility, limits, now);
+    plausibility->last = *now;
+    plausibility->has_last = true;
+    plausibility->ticks = 0.0f;
+    return faults;
+}
+
+static inline uint32_t command_faults(const struct supervisor *supervisor, const struct twin_setpoint *command)
+{
+    if (!(isfinite(command->motor_v) && isfinite(command->dither_amplitude_v)))
+        return 1u << FAULT_COMMAND_NOT_A_NUMBER;
+    const float change_v = command->motor_v - supervisor->setpoint.motor_v;
+    const bool is_amplitude =
+        command->dither_amplitude_v >= 0.0f && command->dither_amplitude_v <= supervisor->most_dither_amplitude_v;
+    return fault_if(fabsf(command->motor_v) > supervisor->most_motor_v, FAULT_MOTOR_VOLTAGE) |
+           fault_if(fabsf(change_v) > supervisor->most_motor_change_v, FAULT_MOTOR_SLEW) |
+           fault_if(!is_amplitude, FAULT_DITHER_AMPLITUDE);
+}
+
+static inline uint32_t judge(struct supervisor *supervisor, const struct measurement *now,
+                             const struct twin_setpoint *command, uint32_t elapsed_counts)
+{
+    uint32_t faults = check_measurement(&supervisor->plausibility, &supervisor->limits, now) |
+                      command_faults(supervisor, command);
+
+    if (supervisor->mode == MODE_STARTING)
+        return faults;
+    if (now)
+        supervisor->ticks_since_frame = 0;
+    else if (supervisor->ticks_since_frame != UINT32_MAX)
+        supervisor->ticks_since_frame++;
+    faults |= fault_if(supervisor->ticks_since_frame > supervisor->frame_age_ticks, FAULT_FRAME_AGE);
+    faults |= fault_if(elapsed_counts < supervisor->window_least_counts ||
+                           elapsed_counts > supervisor->window_most_counts,
+                       FAULT_TICK_WINDOW);
+    return faults;
+}
+
+static inline void towards_neutral(struct supervisor *supervisor)
+{
+    struct twin_setpoint *setpoint = &supervisor->setpoint;
+
+    if (setpoint->motor_v > supervisor->slew_v)
+        setpoint->motor_v -= supervisor->slew_v;
+    else if (setpoint->motor_v < -supervisor->slew_v)
+        setpoint->motor_v += supervisor->slew_v;
+    else
+        setpoint->motor_v = 0.0f;
+    if (setpoint->dither_amplitude_v > supervisor->ramp_v)
+        setpoint->dither_amplitude_v -= supervisor->ramp_v;
+    else
+        setpoint->dither_amplitude_v = 0.0f;
+}
+
+static inline void supervisor_run(struct supervisor *supervisor, const struct measurement *now,
+                                  const struct twin_setpoint *command, uint32_t elapsed_counts,
+                                  uint32_t found_outside)
+{
+    if (supervisor->mode != MODE_SAFE) {
+        supervisor->faults |= found_outside | judge(supervisor, now, command, elapsed_counts);
+        if (supervisor->faults)
+            supervisor->mode = MODE_SAFE;
+        else if (now)
+            supervisor->mode = MODE_ACTIVE;
+    }
+    if (supervisor->mode == MODE_STARTING)
+        supervisor->setpoint = (struct twin_setpoint){ 0.0f, 0.0f };
+    else if (supervisor->mode == MODE_ACTIVE)
+        supervisor->setpoint = *command;
+    else
+        towards_neutral(supervisor);
+}
+
+static inline struct twin_actuation channel_run(struct channel *channel, const struct twin_control_input *input,
+                                                uint32_t found_outside)
+{
+    const enum reception reception = receive(channel, input);
+    const bool is_new = reception == RECEIVED || reception == RECEIVED_SOME_LOST;
+    struct supervisor *supervisor = &channel->supervisor;
+    struct twin_setpoint command = { 0.0f, 0.0f };
+
+    if (is_new) {
+        memcpy(&channel->measurement, input->frame + 4, sizeof channel->measurement);
+        channel->has_measurement = true;
+        channel->valid_counter = channel->received_counter;
+    }
+    if (channel->has_measurement)
+        command = controller_run(&channel->controller, &channel->measurement);
+    supervisor_run(supervisor, is_new ? &channel->measurement : NULL, &command, input->elapsed_counts, found_outside);
+    return (struct twin_actuation){
+        .mode = supervisor->mode,
+        .faults = supervisor->faults,
+        .motor_voltage_v = supervisor->setpoint.motor_v,
+        .dither_amplitude_v = supervisor->setpoint.dither_amplitude_v,
+        .wheel_speed_limit_rpm = supervisor->mode == MODE_ACTIVE ? supervisor->limits.wheel_speed_rpm :
+                                                                   supervisor->limits.safe_wheel_speed_rpm,
+        .warnings = warnings(reception),
+        .sensor_counter = channel->valid_counter,
+    };
+}
+
+/* The lower of two numbers, or the one that is finite. */
+static inline float lower(float a, float b)
+{
+    return b < a || !isfinite(a) ? b : a;
+}
+
+static inline struct twin_actuation tell(struct channel *channel, const struct twin_actuation *told,
+                                         const struct twin_actuation *other, uint8_t *frame)
+{
+    struct twin_actuation actuation = *told;
+
+    actuation.wheel_speed_limit_rpm = lower(told->wheel_speed_limit_rpm, other->wheel_speed_limit_rpm);
+    frame[2] = channel->sent_counter++;
+    frame[3] = (uint8_t)actuation.mode;
+    memcpy(frame + 4, &actuation.faults, 4);
+    memcpy(frame + 8, &actuation.motor_voltage_v, 4);
+    memcpy(frame + 12, &actuation.dither_amplitude_v, 4);
+    memcpy(frame + 16, &actuation.wheel_speed_limit_rpm, 4);
+    memcpy(frame + 20, &actuation.warnings, 2);
+    frame[22] = actuation.sensor_counter;
+    frame[23] = 0;
+    const uint16_t crc = checksum(frame, ACTUATOR_DATA_ID);
+    memcpy(frame, &crc, 2);
+    return actuation;
+}
+
+void twin_control_tick(void *memory, const void *given, void *result)
+{
+    struct task *task = memory;
+    const struct twin_control_input *input = given;
+    struct twin_control_output *output = result;
+    struct channel *a = &task->channels[0], *b = &task->channels[1];
+    _Alignas(4) uint8_t frame[FRAME_LEN], other_frame[FRAME_LEN];
+    const bool differ = task->frames_differed || !channels_agree(a, b, sizeof *a);
+    const uint32_t found_outside = input->found_by_pwm | fault_if(differ, FAULT_CHANNELS_DIFFER);
+    const struct twin_actuation told_a = channel_run(a, input, found_outside);
+    const struct twin_actuation told_b = channel_run(b, input, found_outside);
+
+    output->actuation = tell(a, &told_a, &told_b, frame);
+    tell(b, &told_b, &told_a, other_frame);
+    task->frames_differed = !channels_agree(frame, other_frame, sizeof frame);
+    output->setpoints[0] = a->supervisor.setpoint;
+    output->setpoints[1] = b->supervisor.setpoint;
+    memcpy(output->frame, frame, sizeof frame);
+}
+
+/* Set-up. */
+
+static const struct limits RECONSTRUCTION = {
+    .motor_voltage_v = 4.5f,
+    .motor_slew_v_per_s = 4.0f,
+    .square_amplitude_v = 0.2f,
+    .sine_amplitude_v = 1.3f,
+    .dither_frequency_min_rad_per_s = 1500.0f,
+    .dither_frequency_max_rad_per_s = 5000.0f,
+    .ramp_out_s = 0.1f,
+    .safe_wheel_speed_rpm = 1100.0f,
+    .wheel_speed_rpm = 2500.0f,
+    .wheel_acceleration_rpm_per_s = 20000.0f,
+    .yaw_rate_rad_per_s = 4.0f,
+    .yaw_acceleration_rad_per_s2 = 200.0f,
+    .steering_angle_rad = 1.1f,
+    .steering_angle_change_rad_per_s = 20.0f,
+    .steering_rate_rad_per_s = 4.0f,
+    .steering_acceleration_rad_per_s2 = 200.0f,
+    .current_request_a = 20.0f,
+    .lateral_acceleration_m_per_s2 = 250.0f,
+    .steering_contradiction_rad = 0.05f,
+    .steering_memory_s = 0.2f,
+    .stuck_steering_rad = 0.2f,
+    .stuck_wheel_speed_rpm = 100.0f,
+    .frame_age_s = 0.01f,
+    .tick_tolerance = 0.2f,
+};
+
+static void crc_init(void)
+{
+    for (unsigned byte = 0; byte < 256; byte++) {
+        uint16_t crc = (uint16_t)(byte << 8);
+        for (int bit = 0; bit < 8; bit++)
+            crc = (uint16_t)(crc << 1) ^ (crc & 0x8000 ? 0x1021 : 0);
+        crc_table[byte] = crc;
+    }
+}
+
+static void controller_init(struct controller *controller, const struct twin_choice *choice)
+{
+    float peak_v = 0.0f;
+
+    controller->policy = (struct policy){ 1530.0f, 20.0f, 0.5f, 14.0f, 10.0f };
+    controller->schedule_first_rpm = choice->schedule_first_rpm;
+    controller->schedule_step_rpm = choice->schedule_step_rpm;
+    for (int i = 0; i < SCHEDULE_POINTS; i++) {
+        const float amplitude_v = choice->schedule_amplitudes_v[i];
+        controller->schedule_amplitudes_v[i] = amplitude_v;
+        if (amplitude_v > peak_v)
+            peak_v = amplitude_v;
+    }
+    controller->winding_resistance_ohm = 0.3f;
+    controller->period_s = 1.0f / CONTROL_RATE_HZ;
+    controller->ticks_to_dither = (uint32_t)(choice->start_time_s * CONTROL_RATE_HZ + 0.5f);
+    controller->amplitude_step_v = peak_v / (controller->policy.dither_ramp_s * CONTROL_RATE_HZ);
+}
+
+static void supervisor_init(struct supervisor *supervisor, const struct twin_choice *choice)
+{
+    const struct limits *limits = &supervisor->limits;
+    const float period_s = 1.0f / CONTROL_RATE_HZ;
+    const float counts = (float)choice->clock_hz * period_s;
+    const float tolerance = RECONSTRUCTION.tick_tolerance * counts;
+    const float amplitude_limit_v = choice->waveform == WAVEFORM_SQUARE ? RECONSTRUCTION.square_amplitude_v :
+                                    choice->waveform == WAVEFORM_SINE   ? RECONSTRUCTION.sine_amplitude_v :
+                                                                          0.0f;
+
+    supervisor->limits = RECONSTRUCTION;
+    supervisor->plausibility.control_period_s = period_s;
+    supervisor->plausibility.speed_per_rpm = (float)(6.28318530717958647693 / 60.0) * 0.3f * 1.0f;
+    supervisor->slew_v = limits->motor_slew_v_per_s * period_s;
+    supervisor->most_motor_v = limits->motor_voltage_v * (1.0f + ROUNDING);
+    supervisor->most_motor_change_v = supervisor->slew_v + ROUNDING * limits->motor_voltage_v;
+    supervisor->most_dither_amplitude_v = amplitude_limit_v * (1.0f + ROUNDING);
+    supervisor->ramp_v = amplitude_limit_v * period_s / limits->ramp_out_s;
+    supervisor->window_least_counts = (uint32_t)(counts - tolerance);
+    supervisor->window_most_counts = (uint32_t)(counts + tolerance);
+    supervisor->frame_age_ticks = (uint32_t)(limits->frame_age_s * CONTROL_RATE_HZ + 0.5f);
+}
+
+size_t twin_control_size(void)
+{
+    return sizeof(struct task);
+}
+
+void twin_control_init(void *memory, const struct twin_choice *choice)
+{
+    struct task *task = memory;
+
+    crc_init();
+    memset(task, 0, sizeof *task);
+    for (int i = 0; i < 2; i++) {
+        struct channel *channel = &task->channels[i];
+        channel->received_counter = UINT8_MAX;
+        channel->valid_counter = UINT8_MAX;
+        controller_init(&channel->controller, choice);
+        supervisor_init(&channel->supervisor, choice);
+    }
+}

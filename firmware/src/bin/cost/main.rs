@@ -1,0 +1,358 @@
+//! What Rust costs: the model's step and the ECU program's two tasks beside the same in C, on the same inputs.
+//!
+//! The outputs must be equal in every bit. Takes a scenario as the ECU does, of which the twin in C knows the choices of waveform,
+//! tyre, slip angle and friction, the wheel speed and the time at which the dither sets in. Logs a line for each pair.
+
+#![no_std]
+#![no_main]
+
+mod count;
+mod drive;
+mod twin;
+
+use core::ffi::c_void;
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+use count::{Copies, REPEATS, Tally, counted};
+use drive::Drive;
+use firmware::board::{Board, Current};
+use firmware::exit::ExitCode;
+use firmware::{command_line, fault, log};
+use shared_model::dither::Injection;
+use shared_model::ecu::{ControlInput, ControlOutput, ControlTask, Ecu, PwmTask};
+use shared_model::exchange::FRAME_LEN;
+use shared_model::friction::FrictionMode;
+use shared_model::gate::{Faults, Setpoint};
+use shared_model::signal::{Actuation, Mode};
+use shared_model::vehicle::{Model, State};
+use shared_model::{Scenario, integrate};
+use twin::{
+    Call, Choice, ControlInputOf, ControlOutputBits, InjectionOf, PwmInputOf, PwmOutput, StateBits,
+};
+
+/// Steps of the model, a millisecond each.
+const STEPS: u32 = 4000;
+/// Of so many the last begins in a state that no motion led to.
+const STEPS_A_MOTION: u32 = 40;
+/// Room for a task in C, which says how much it needs.
+const MODEL_BYTES: usize = 512;
+const PWM_BYTES: usize = 256;
+const CONTROL_BYTES: usize = 1536;
+
+/// Memory of a task in C.
+#[derive(Clone, Copy)]
+#[repr(C, align(8))]
+struct Memory<const BYTES: usize>([u8; BYTES]);
+
+impl<const BYTES: usize> Memory<BYTES> {
+    /// Memory that `fill` fills; `None` if it needs more.
+    fn new(needed: usize, fill: impl FnOnce(*mut c_void)) -> Option<Self> {
+        let mut memory = Self([0; BYTES]);
+        (needed <= BYTES).then(|| {
+            fill((&raw mut memory).cast());
+            memory
+        })
+    }
+}
+
+/// One task in both languages.
+struct Pair<T: 'static, const BYTES: usize> {
+    name: &'static str,
+    rust: T,
+    rust_call: Call,
+    rust_copies: &'static mut Copies<T>,
+    rust_tally: &'static mut Tally,
+    c: Memory<BYTES>,
+    c_call: Call,
+    c_copies: &'static mut Copies<Memory<BYTES>>,
+    c_tally: &'static mut Tally,
+}
+
+impl<T: Clone, const BYTES: usize> Pair<T, BYTES> {
+    /// The same call in both, counted.
+    fn call<RI, RO, CI, CO>(&mut self, rust: (&RI, &mut RO), c: (&CI, &mut CO)) {
+        let instructions = counted(
+            self.rust_call,
+            &mut self.rust,
+            self.rust_copies,
+            rust.0,
+            rust.1,
+        );
+        self.rust_tally.note(instructions);
+        let instructions = counted(self.c_call, &mut self.c, self.c_copies, c.0, c.1);
+        self.c_tally.note(instructions);
+    }
+
+    fn log(&self) {
+        for (language, tally) in [("rust", &self.rust_tally), ("c", &self.c_tally)] {
+            defmt::info!(
+                "cost {=str} {=str} calls {=u32} median {=u32} mean {=u32} most {=u32}",
+                self.name,
+                language,
+                tally.calls(),
+                tally.median(),
+                tally.mean(),
+                tally.most()
+            );
+        }
+    }
+}
+
+/// Both tasks with their calls, and memory for the rest.
+macro_rules! pair {
+    ($name:literal, $type:ty: $rust:expr, $rust_call:path, $bytes:ident: $c:expr, $c_call:path) => {
+        Pair {
+            name: $name,
+            rust: $rust,
+            rust_call: $rust_call,
+            rust_copies: cortex_m::singleton!(: Copies<$type> = [const { MaybeUninit::uninit() }; REPEATS])?,
+            rust_tally: cortex_m::singleton!(: Tally = Tally::EMPTY)?,
+            c: $c?,
+            c_call: $c_call,
+            c_copies: cortex_m::singleton!(: Copies<Memory<$bytes>> = [const { MaybeUninit::uninit() }; REPEATS])?,
+            c_tally: cortex_m::singleton!(: Tally = Tally::EMPTY)?,
+        }
+    };
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    log::open();
+    let code = match command_line::read() {
+        Ok(command) => run(&command.scenario),
+        Err(_) => ExitCode::BadScenario,
+    };
+    fault::end_safely(code)
+}
+
+fn run(scenario: &Scenario<f32>) -> ExitCode {
+    let Ok(ecu) = Ecu::new(scenario, Current::COST_CLOCK_HZ) else {
+        return ExitCode::BadScenario;
+    };
+    // For its counter; nothing is to interrupt.
+    let _ = Current::start_pwm(ecu.pwm.neutral().period());
+    Current::stop_pwm_interrupt();
+    let choice = Choice::of(scenario, Current::COST_CLOCK_HZ);
+    let model = step_model(scenario, &choice);
+    let ecu = run_ecu(scenario, ecu, &choice);
+    match (model, ecu) {
+        (Some(true), Some(true)) => ExitCode::Complete,
+        (Some(_), Some(_)) => ExitCode::Unequal,
+        _ => ExitCode::BadScenario,
+    }
+}
+
+/// The model and its state.
+#[derive(Clone)]
+struct ModelTask {
+    model: Model<f32>,
+    step_s: f32,
+    state: State<f32>,
+}
+
+// SAFETY: called with a task and an input of these types.
+unsafe extern "C" fn step(task: *mut c_void, input: *const c_void, _output: *mut c_void) {
+    // SAFETY: as above.
+    let (task, injection) = unsafe {
+        (
+            &mut *task.cast::<ModelTask>(),
+            &*input.cast::<Injection<f32>>(),
+        )
+    };
+    integrate::step(&task.model, &mut task.state, task.step_s, *injection);
+}
+
+/// Along a motion, and from states on and off it; true if all are equal.
+fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
+    let model = Model::new(scenario);
+    let task = ModelTask {
+        model,
+        step_s: scenario.step_s(),
+        state: model.initial_state(scenario),
+    };
+    let twin = Memory::new(
+        // SAFETY: takes nothing.
+        unsafe { twin::twin_model_size() },
+        // SAFETY: there is enough of it.
+        |memory| unsafe { twin::twin_model_init(memory, choice) },
+    );
+    let mut pair =
+        pair!("model-step", ModelTask: task, step, MODEL_BYTES: twin, twin::twin_model_step);
+    let mut random = Random(1);
+    let mut injection = Injection::Off;
+    let (mut at_rest, mut changes, mut unequal) = (0_u32, 0_u32, 0_u32);
+    for index in 0..STEPS {
+        if index == STEPS / 4 {
+            injection = scenario.dither.injection(0.0);
+        }
+        if index % STEPS_A_MOTION == STEPS_A_MOTION - 1 {
+            pair.rust.state = model.state(random.vector().into());
+        }
+        let before = pair.rust.state.friction;
+        let state = StateBits::from(&pair.rust.state);
+        // SAFETY: the memory is a model's.
+        unsafe { twin::twin_model_set_state((&raw mut pair.c).cast(), &state) };
+        pair.call(
+            (&injection, &mut ()),
+            (&InjectionOf::from(&injection), &mut ()),
+        );
+        let mut c = StateBits::default();
+        // SAFETY: the memory is a model's.
+        unsafe { twin::twin_model_state((&raw const pair.c).cast(), &mut c) };
+        let after = pair.rust.state.friction;
+        at_rest += u32::from(after == FrictionMode::Sticking);
+        changes += u32::from(before != after);
+        unequal += u32::from(StateBits::from(&pair.rust.state) != c);
+    }
+    pair.log();
+    defmt::info!(
+        "model-step: {=u32} end at rest, {=u32} change the friction's mode, {=u32} unequal",
+        at_rest,
+        changes,
+        unequal
+    );
+    Some(unequal == 0)
+}
+
+/// Numbers that look random.
+struct Random(u32);
+
+impl Random {
+    /// From -1 to 1.
+    fn number(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (self.0 >> 8) as f32 / 8_388_608.0 - 1.0
+    }
+
+    /// A state vector, of a chaotic motion's size or of one that is coming to rest.
+    fn vector(&mut self) -> [f32; 4] {
+        let size = if self.number() < 0.0 { 0.1 } else { 1.0 };
+        [0.3, 2.0, 0.5, 2.0].map(|most| size * most * self.number())
+    }
+}
+
+// SAFETY: called with a task, an input and an output of these types.
+unsafe extern "C" fn period(task: *mut c_void, input: *const c_void, output: *mut c_void) {
+    // SAFETY: as above.
+    let (task, input, output) = unsafe {
+        (
+            &mut *task.cast::<PwmTask<f32>>(),
+            &*input.cast::<PwmInput>(),
+            &mut *output.cast::<PwmOutput>(),
+        )
+    };
+    let period = task.begin();
+    if period.control_due {
+        if let Some(output) = &input.output {
+            task.accept(output);
+        }
+    }
+    task.end(period.duty.code() ^ input.pin_error);
+    *output = PwmOutput {
+        duty_code: period.duty.code(),
+        control_due: period.control_due,
+        faults: if period.control_due {
+            task.faults().bits()
+        } else {
+            0
+        },
+    };
+}
+
+/// Input of a PWM period.
+struct PwmInput {
+    output: Option<ControlOutput<f32>>,
+    pin_error: u16,
+}
+
+// SAFETY: called with a task, an input and an output of these types.
+unsafe extern "C" fn tick(task: *mut c_void, input: *const c_void, output: *mut c_void) {
+    // SAFETY: as above; the output is one.
+    unsafe {
+        let task = &mut *task.cast::<ControlTask<f32>>();
+        let input = &*input.cast::<ControlInput>();
+        *output.cast::<ControlOutput<f32>>() = task.run(input);
+    }
+}
+
+/// A drive; true if all periods and ticks are equal.
+fn run_ecu(scenario: &Scenario<f32>, ecu: Ecu<f32>, choice: &Choice) -> Option<bool> {
+    let pwm_twin = Memory::new(
+        // SAFETY: takes nothing.
+        unsafe { twin::twin_pwm_size() },
+        // SAFETY: there is enough of it.
+        |memory| unsafe { twin::twin_pwm_init(memory, choice) },
+    );
+    let control_twin = Memory::new(
+        // SAFETY: takes nothing.
+        unsafe { twin::twin_control_size() },
+        // SAFETY: there is enough of it.
+        |memory| unsafe { twin::twin_control_init(memory, choice) },
+    );
+    let Ecu { pwm, control, .. } = ecu;
+    let mut pwm =
+        pair!("pwm-period", PwmTask<f32>: pwm, period, PWM_BYTES: pwm_twin, twin::twin_pwm_period);
+    let mut control = pair!("control-tick", ControlTask<f32>: control, tick, CONTROL_BYTES: control_twin, twin::twin_control_tick);
+    let mut drive = Drive::new(scenario);
+    let nominal_counts = Current::COST_CLOCK_HZ / scenario.run.control_rate_hz as u32;
+    let mut input = PwmInput {
+        output: None,
+        pin_error: 0,
+    };
+    let (mut ticks, mut periods, mut unequal, mut safe) = (0, 0_u32, 0_u32, 0_u32);
+    while ticks < drive::TICKS {
+        input.pin_error = Drive::pin_error(periods);
+        periods += 1;
+        let (mut rust, mut c) = (PwmOutput::default(), PwmOutput::default());
+        let of_c = PwmInputOf::new(input.output.as_ref(), input.pin_error);
+        pwm.call((&input, &mut rust), (&of_c, &mut c));
+        unequal += u32::from(rust != c);
+        if !rust.control_due {
+            continue;
+        }
+        let tick_input = ControlInput {
+            frame: drive.frame(ticks),
+            elapsed_counts: nominal_counts,
+            found_by_pwm: Faults::from_bits(rust.faults),
+        };
+        ticks += 1;
+        let mut rust = input.output.unwrap_or(NO_OUTPUT);
+        let mut c = ControlOutputBits::default();
+        let of_c = ControlInputOf::from(&tick_input);
+        control.call((&tick_input, &mut rust), (&of_c, &mut c));
+        unequal += u32::from(ControlOutputBits::from(&rust) != c);
+        safe += u32::from(rust.actuation.mode == Mode::Safe);
+        input.output = Some(rust);
+    }
+    pwm.log();
+    control.log();
+    defmt::info!(
+        "pwm-period and control-tick: {=u32} ticks in the safe state, {=u32} unequal",
+        safe,
+        unequal
+    );
+    Some(unequal == 0)
+}
+
+/// What stands in the output's place before the first tick.
+const NO_OUTPUT: ControlOutput<f32> = ControlOutput {
+    setpoints: [Setpoint {
+        motor_v: 0.0,
+        dither_amplitude_v: 0.0,
+    }; 2],
+    frame: [0; FRAME_LEN],
+    actuation: Actuation {
+        mode: Mode::Starting,
+        faults: 0,
+        motor_voltage_v: 0.0,
+        dither_amplitude_v: 0.0,
+        wheel_speed_limit_rpm: 0.0,
+        warnings: 0,
+        sensor_counter: 0,
+    },
+};
+
+#[panic_handler]
+fn panic(_info: &PanicInfo<'_>) -> ! {
+    fault::end_safely(ExitCode::Panic)
+}

@@ -1,0 +1,239 @@
+//! What passes between the Rust program and its twin in C: the declarations of `c-twin/twin.h`.
+
+use core::ffi::c_void;
+use shared_model::Scenario;
+use shared_model::dither::{Injection, Waveform};
+use shared_model::ecu::{ControlInput, ControlOutput};
+use shared_model::exchange::FRAME_LEN;
+use shared_model::friction::FrictionLaw;
+use shared_model::gate::Setpoint;
+use shared_model::schedule_table::{POINTS, SINE, SQUARE};
+use shared_model::tire::TireModel;
+use shared_model::vehicle::{SlipForm, State};
+
+/// A call that is counted: task, input, output.
+// SAFETY: a type; whoever calls says why it may.
+pub type Call = unsafe extern "C" fn(*mut c_void, *const c_void, *mut c_void);
+
+/// What a scenario may choose.
+#[repr(C)]
+pub struct Choice {
+    waveform: u32,
+    slip_form: u32,
+    tire: u32,
+    friction_law: u32,
+    friction_dithered: u32,
+    wheel_speed_rpm: f32,
+    start_time_s: f32,
+    schedule_first_rpm: f32,
+    schedule_step_rpm: f32,
+    schedule_amplitudes_v: *const f32,
+    clock_hz: u32,
+}
+
+static NO_AMPLITUDES: [f32; POINTS] = [0.0; POINTS];
+
+impl Choice {
+    pub fn of(scenario: &Scenario<f32>, clock_hz: u32) -> Self {
+        let (waveform, amplitudes_v) = match scenario.dither.waveform {
+            Waveform::None => (0, &NO_AMPLITUDES),
+            Waveform::Square => (1, &SQUARE.amplitudes_v),
+            Waveform::Sine => (2, &SINE.amplitudes_v),
+        };
+        Self {
+            waveform,
+            slip_form: match scenario.vehicle.slip_form {
+                SlipForm::SmallAngle => 0,
+                SlipForm::Exact => 1,
+            },
+            tire: match scenario.tires.model {
+                TireModel::Cubic => 0,
+                TireModel::MagicFormula => 1,
+            },
+            friction_law: match scenario.friction.law {
+                FrictionLaw::None => 0,
+                FrictionLaw::CoulombRate => 1,
+                FrictionLaw::PrintedAngle => 2,
+            },
+            friction_dithered: scenario.friction.dithered.into(),
+            wheel_speed_rpm: scenario.run.wheel_speed_rpm,
+            start_time_s: scenario.dither.start_time_s,
+            schedule_first_rpm: SQUARE.first_rpm,
+            schedule_step_rpm: SQUARE.step_rpm,
+            schedule_amplitudes_v: amplitudes_v.as_ptr(),
+            clock_hz,
+        }
+    }
+}
+
+/// The model's state. Equal if its bits are.
+#[repr(C)]
+#[derive(Clone, Copy, Default, PartialEq)]
+pub struct StateBits {
+    x: [u32; 4],
+    friction: u32,
+}
+
+impl From<&State<f32>> for StateBits {
+    fn from(state: &State<f32>) -> Self {
+        let [x] = state.x.data.0;
+        Self {
+            x: x.map(f32::to_bits),
+            friction: state.friction as u32,
+        }
+    }
+}
+
+/// The dither's injection.
+#[repr(C)]
+pub struct InjectionOf {
+    kind: u32,
+    rad: f32,
+}
+
+impl From<&Injection<f32>> for InjectionOf {
+    fn from(injection: &Injection<f32>) -> Self {
+        let (kind, rad) = match *injection {
+            Injection::Off => (0, 0.0),
+            Injection::SquareMean { amplitude } => (1, amplitude),
+            Injection::SineMean { amplitude } => (2, amplitude),
+            Injection::Shift { offset } => (3, offset),
+        };
+        Self { kind, rad }
+    }
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, Default, PartialEq)]
+struct SetpointBits {
+    motor_v: u32,
+    dither_amplitude_v: u32,
+}
+
+impl From<&Setpoint<f32>> for SetpointBits {
+    fn from(setpoint: &Setpoint<f32>) -> Self {
+        Self {
+            motor_v: setpoint.motor_v.to_bits(),
+            dither_amplitude_v: setpoint.dither_amplitude_v.to_bits(),
+        }
+    }
+}
+
+/// Input of a PWM period.
+#[repr(C)]
+#[derive(Default)]
+pub struct PwmInputOf {
+    has_setpoints: bool,
+    setpoints: [SetpointBits; 2],
+    pin_error: u16,
+}
+
+impl PwmInputOf {
+    pub fn new(output: Option<&ControlOutput<f32>>, pin_error: u16) -> Self {
+        Self {
+            has_setpoints: output.is_some(),
+            setpoints: output.map_or_else(Default::default, setpoints),
+            pin_error,
+        }
+    }
+}
+
+fn setpoints(output: &ControlOutput<f32>) -> [SetpointBits; 2] {
+    let [a, b] = &output.setpoints;
+    [a.into(), b.into()]
+}
+
+/// Output of a PWM period, of both languages.
+#[repr(C)]
+#[derive(Clone, Copy, Default, PartialEq)]
+pub struct PwmOutput {
+    pub duty_code: u16,
+    pub control_due: bool,
+    /// Where a control tick is due.
+    pub faults: u32,
+}
+
+/// Input of a control tick.
+#[repr(C)]
+pub struct ControlInputOf {
+    has_frame: bool,
+    frame: [u8; FRAME_LEN],
+    elapsed_counts: u32,
+    found_by_pwm: u32,
+}
+
+impl From<&ControlInput> for ControlInputOf {
+    fn from(input: &ControlInput) -> Self {
+        Self {
+            has_frame: input.frame.is_some(),
+            frame: input.frame.unwrap_or_default(),
+            elapsed_counts: input.elapsed_counts,
+            found_by_pwm: input.found_by_pwm.bits(),
+        }
+    }
+}
+
+/// Output of a control tick. Equal if its bits are.
+#[repr(C)]
+#[derive(Clone, Copy, Default, PartialEq)]
+pub struct ControlOutputBits {
+    setpoints: [SetpointBits; 2],
+    frame: [u8; FRAME_LEN],
+    mode: u32,
+    faults: u32,
+    motor_voltage_v: u32,
+    dither_amplitude_v: u32,
+    wheel_speed_limit_rpm: u32,
+    warnings: u16,
+    sensor_counter: u8,
+}
+
+impl From<&ControlOutput<f32>> for ControlOutputBits {
+    fn from(output: &ControlOutput<f32>) -> Self {
+        let told = &output.actuation;
+        Self {
+            setpoints: setpoints(output),
+            frame: output.frame,
+            mode: told.mode as u32,
+            faults: told.faults,
+            motor_voltage_v: told.motor_voltage_v.to_bits(),
+            dither_amplitude_v: told.dither_amplitude_v.to_bits(),
+            wheel_speed_limit_rpm: told.wheel_speed_limit_rpm.to_bits(),
+            warnings: told.warnings,
+            sensor_counter: told.sensor_counter,
+        }
+    }
+}
+
+// SAFETY: declared as in twin.h.
+unsafe extern "C" {
+    pub fn twin_model_size() -> usize;
+    pub fn twin_pwm_size() -> usize;
+    pub fn twin_control_size() -> usize;
+    pub fn twin_model_init(memory: *mut c_void, choice: *const Choice);
+    pub fn twin_pwm_init(memory: *mut c_void, choice: *const Choice);
+    pub fn twin_control_init(memory: *mut c_void, choice: *const Choice);
+    pub fn twin_model_set_state(memory: *mut c_void, state: *const StateBits);
+    pub fn twin_model_state(memory: *const c_void, state: *mut StateBits);
+    pub fn twin_model_step(memory: *mut c_void, injection: *const c_void, unused: *mut c_void);
+    pub fn twin_pwm_period(memory: *mut c_void, input: *const c_void, output: *mut c_void);
+    pub fn twin_control_tick(memory: *mut c_void, input: *const c_void, output: *mut c_void);
+}
+
+macro_rules! share {
+    ($($name:ident = $function:path;)*) => {$(
+        // SAFETY: the one function of that name.
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(x: f32) -> f32 {
+            $function(x)
+        }
+    )*};
+}
+
+// The transcendental functions are those of one library for both.
+share! {
+    twin_sinf = shared_model::Real::sin;
+    twin_cosf = shared_model::Real::cos;
+    twin_atanf = shared_model::Real::atan;
+    twin_asinf = shared_model::Real::asin;
+}
