@@ -37,7 +37,9 @@ const COMPARED_S: f64 = 10.0;
 /// Largest error at that instant, rad and rad/s.
 const MOST_ERROR: f64 = 7e-8;
 /// Tolerances from coarse to fine, of which the first that keeps the error is taken.
-const TOLERANCES: [f64; 9] = [1e-9, 5e-10, 2e-10, 1e-10, 5e-11, 2e-11, 1e-11, 1e-12, 1e-13];
+const TOLERANCES: [f64; 11] = [
+    4e-10, 3.2e-10, 2.5e-10, 2e-10, 1.6e-10, 1.3e-10, 1e-10, 5e-11, 2e-11, 1e-12, 1e-13,
+];
 /// Length of a motion of job M, s, half of it a transient.
 const MAP_TIME_S: f64 = 200.0;
 const MAP_TOLERANCE: f64 = 1e-10;

@@ -24,8 +24,13 @@ const MOST_SHRINKS: usize = 300;
 const RATE_FLOOR: f64 = 1e-13;
 /// Least time between two changes of mode, s: an end sooner than that is rounding of the torque at its limit.
 const SHORTEST_MODE_S: f64 = 1e-9;
-/// Changes of mode in a row, each within the shortest time, by which a motion slides along a step of its friction law.
+/// A mode shorter than this, s, is one of a row in which a motion slides along a step of its friction law, and so many of them are
+/// one too many.
+const SHORT_MODE_S: f64 = 1e-6;
 const MOST_SHORT_MODES: usize = 1000;
+/// Share of the friction limit by which the torque must exceed it before the steering leaves rest. At rest right at the limit
+/// rounding would otherwise release it and stop it for ever.
+const RELEASE_MARGIN: f64 = 1e-10;
 /// Lengths of a tangent vector, squared, that leave room for a step's growth.
 const LENGTHS_SQUARED: (f64, f64) = (1e-200, 1e200);
 /// A tangent vector is lost when orthogonalisation leaves less than this share of it, squared.
@@ -324,12 +329,17 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             };
             x[argument] = beyond;
         }
-        let to = next_mode(model, injection, from, &mut x);
+        let mut to = next_mode(model, injection, from, &mut x);
+        let torque_nm = model.driving_torque_nm(&x, injection).abs();
+        let held_nm = model.friction_limit_nm() * (1.0 + RELEASE_MARGIN);
+        if from != FrictionMode::Sticking && model.can_stick(injection) && torque_nm <= held_nm {
+            to = FrictionMode::Sticking;
+        }
         let before = model.derivative(&x, injection, from);
         let after = model.derivative(&x, injection, to);
         motion.mode = to;
         motion.found.events += 1;
-        motion.short_modes = if lasted_s <= SHORTEST_MODE_S {
+        motion.short_modes = if lasted_s <= SHORT_MODE_S {
             motion.short_modes + 1
         } else {
             0
@@ -367,13 +377,17 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         let guard = Guard::of(model, injection, motion.mode);
         let constants = model.constants();
         // While sticking the guard is the driving torque, whose constant goes over to the bounds.
-        let (per_force, shift) = match motion.mode {
-            FrictionMode::Sticking => (-constants.trail_m, constants.motor_torque_nm),
-            _ => (0.0, 0.0),
+        let (per_force, shift, wider) = match motion.mode {
+            FrictionMode::Sticking => (
+                -constants.trail_m,
+                constants.motor_torque_nm,
+                1.0 + RELEASE_MARGIN,
+            ),
+            _ => (0.0, 0.0, 1.0),
         };
         self.guard.per_force.as_mut_slice()[lane] = per_force;
-        self.guard.lower.as_mut_slice()[lane] = guard.lower - shift;
-        self.guard.upper.as_mut_slice()[lane] = guard.upper - shift;
+        self.guard.lower.as_mut_slice()[lane] = guard.lower * wider - shift;
+        self.guard.upper.as_mut_slice()[lane] = guard.upper * wider - shift;
     }
 
     /// Keeps a single tangent vector within the range of numbers; several at right angles and of length one, by Gram and Schmidt.
@@ -544,8 +558,13 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         for i in 0..4 {
             self.expansion.x[i][0].as_mut_slice()[lane] = start[i];
             for (k, tangent) in self.expansion.tangents.iter_mut().enumerate() {
-                // Linearly independent, and none along an axis, which may be invariant.
-                let part = if i == k { 1.5 } else { 0.5 };
+                // Linearly independent, and none along an axis, which may be invariant; a steering that sticks has no rate.
+                let sticks = task.is_some_and(|t| t.start.friction == FrictionMode::Sticking);
+                let part = match i {
+                    STEERING_RATE if sticks => 0.0,
+                    _ if i == k => 1.5,
+                    _ => 0.5,
+                };
                 tangent.x[i][0].as_mut_slice()[lane] = part;
             }
         }

@@ -71,7 +71,7 @@ pub type Growths<const K: usize> = [f64; K];
 pub struct Found<const K: usize> {
     /// The state at the end.
     pub end: State<f64>,
-    /// When it left all bounds, s from the start.
+    /// When it left all bounds, s from the start; or when its friction modes became too short to tell.
     pub diverged: Option<Diverged>,
     /// Turning points of each component watched: time from the start (s) and value.
     pub turns: [Vec<(f64, f64)>; 4],

@@ -32,10 +32,25 @@ pub(super) fn derivative<const N: usize>(polynomial: &[f64; N]) -> [f64; N] {
 /// roots, and where they leave open how many there are, the interval is halved. Roots where the sign does not change may be
 /// left out.
 pub(super) fn roots<const N: usize>(polynomial: &[f64; N], end: f64, mut see: impl FnMut(f64)) {
+    if is_monotone(polynomial, end) {
+        if (polynomial[0] < 0.0) != (value(polynomial, end) < 0.0) {
+            see(refine(polynomial, 0.0, end));
+        }
+        return;
+    }
     let bernstein = to_bernstein(polynomial, end);
     isolate(&bernstein, 0.0, 1.0, &mut |from, to| {
         see(refine(polynomial, from * end, to * end));
     });
+}
+
+/// The linear term outweighs all others within (0, `end`): the usual case, in which there is at most one root.
+fn is_monotone<const N: usize>(polynomial: &[f64; N], end: f64) -> bool {
+    let mut others = 0.0;
+    for k in (2..N).rev() {
+        others = (others + k as f64 * polynomial[k].abs()) * end;
+    }
+    polynomial[1].abs() > others
 }
 
 /// Coefficients in Bernstein's basis of degree N - 1 on [0, `end`].
