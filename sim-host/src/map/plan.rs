@@ -42,7 +42,7 @@ impl Grid {
                 count: self.count,
             });
         }
-        Values::new(what, self.from, self.to, self.step())?;
+        Values::new(what, self.from, self.to, self.step().abs())?;
         Ok(())
     }
 }

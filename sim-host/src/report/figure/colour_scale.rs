@@ -45,9 +45,10 @@ impl ColourScale {
     pub fn bar(&self, area: &Area, (top, bottom): (i32, i32)) -> anyhow::Result<()> {
         let height = |share: f64| bottom - (share * f64::from(bottom - top)).round() as i32;
         for shade in 0..SHADES {
-            let share = |k: i32| f64::from(k) / f64::from(SHADES);
-            let corners = [(0, height(share(shade + 1))), (BAR, height(share(shade)))];
-            let colour = self.at(0.5 * (share(shade) + share(shade + 1)));
+            let share = |k: f64| k / f64::from(SHADES);
+            // Up to the top, so that no seam is left between two shades.
+            let corners = [(0, top), (BAR, height(share(f64::from(shade))))];
+            let colour = self.at(share(f64::from(shade) + 0.5));
             area.draw(&Rectangle::new(corners, colour.filled()))?;
         }
         let frame = Rectangle::new([(0, top), (BAR, bottom)], INK.stroke_width(2));

@@ -39,15 +39,15 @@ impl Shown {
 
     fn caption(self) -> &'static str {
         match self {
-            Self::Exponent => "largest Lyapunov exponent (1/s)",
-            Self::Period => "maxima of the yaw rate in a cycle",
-            Self::YawRate => "yaw rate, peak to peak (rad/s)",
+            Self::Exponent => "exponent (1/s)",
+            Self::Period => "period",
+            Self::YawRate => "yaw rate (rad/s)",
         }
     }
 
     fn number(self, cell: &Cell) -> Option<f64> {
         match self {
-            Self::Exponent => cell.exponent_per_s,
+            Self::Exponent => shown_exponent(cell),
             Self::Period => None,
             Self::YawRate => cell.yaw_rate_peak_to_peak_rad_per_s,
         }
@@ -95,6 +95,17 @@ impl Shown {
             }
         }
     }
+}
+
+/// The exponent, 1/s; at most zero unless it counts as positive, so that scatter about zero is not taken for chaos.
+fn shown_exponent(cell: &Cell) -> Option<f64> {
+    let (exponent, threshold) = (cell.exponent_per_s?, cell.exponent_threshold_per_s?);
+    let positive = exponent > threshold;
+    Some(if positive {
+        exponent
+    } else {
+        exponent.min(0.0)
+    })
 }
 
 /// What the panel of the period tells apart, from light to dark.
@@ -168,7 +179,7 @@ pub fn draw(plan: &Plan, cells: &[Cell]) -> anyhow::Result<String> {
     let rows = (blocks.len() * Shown::ALL.len()) as u32;
     let height = rows * (CAPTION + PANEL_HEIGHT + TICKS_AND_NAME);
     let mut rasters = Vec::new();
-    let heading = "Motion over wheel speed and dither amplitude";
+    let heading = "Largest Lyapunov exponent, period, and peak-to-peak yaw rate";
     let mut svg = figure(heading, &[], height, |area| {
         let mut rest = area.clone();
         for block in &blocks {
@@ -236,11 +247,11 @@ fn key(area: &Area, top: i32) -> anyhow::Result<()> {
 fn name(sheet: &Sheet) -> String {
     let waveform = match sheet.waveform {
         Waveform::Sine => "sine",
-        Waveform::Square | Waveform::None => "square wave",
+        Waveform::Square | Waveform::None => "square",
     };
     match sheet.start {
         Start::Given => waveform.into(),
-        Start::Mirrored => format!("{waveform}, mirrored start"),
+        Start::Mirrored => format!("{waveform} mirrored"),
     }
 }
 
