@@ -9,6 +9,7 @@
 //! | what of the dither can an actuator produce? | [`realisability`] |
 //! | is a motion chaotic, or which period has it? | [`chaos`] |
 //! | where does averaging the dither start to hold? | [`averaging`] |
+//! | which motion has each wheel speed and dither amplitude, with which exponent? | [`map`] |
 //! | which amplitude suppresses the chaos at which speed? | [`schedule`] |
 //! | how good is the fixed step? | [`convergence`], [`engine::reference`] |
 //! | how does the vehicle move under the ECU's duty, and what do its sensors tell? | [`closed_loop`] |
@@ -36,6 +37,7 @@ pub mod engine;
 pub mod equivalence;
 pub mod image;
 pub mod instructions;
+pub mod map;
 pub mod motion;
 pub mod paper;
 pub mod pil;

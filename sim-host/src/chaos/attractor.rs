@@ -207,7 +207,7 @@ pub fn attractor(
 }
 
 /// Maxima and exponent must agree.
-fn kind(
+pub(crate) fn kind(
     period: Period,
     exponent: Option<Exponent>,
     with_exponent: bool,

@@ -19,7 +19,7 @@ const MIN_PIECES: usize = 16;
 /// Where the yaw rate has no maxima (at rest), pieces of equal time.
 const PIECES_AT_REST: usize = 64;
 /// Pieces of equal time that a free-running motion is cut into.
-const PIECES: usize = 128;
+pub(crate) const PIECES: usize = 128;
 /// A tangent vector is lost when orthogonalisation leaves less than this share of it: rounding leaves 1e-16 of a vector that has
 /// no direction of its own, contraction within one step leaves far more.
 const LOST: f64 = 1e-12;

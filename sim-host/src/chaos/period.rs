@@ -12,7 +12,7 @@ pub const TOLERANCE: f64 = 2e-3;
 /// The same under the true dither signal, whose ripple the maxima ride on.
 pub const RIPPLE_TOLERANCE: f64 = 1e-2;
 /// Height over its surroundings at which a maximum counts, as a share of the yaw rate's range.
-pub(super) const PROMINENCE: f64 = 1e-2;
+pub(crate) const PROMINENCE: f64 = 1e-2;
 /// A yaw rate that varies by less than this is at rest, rad/s.
 pub(super) const AT_REST_RAD_PER_S: f64 = 1e-6;
 
@@ -91,7 +91,7 @@ pub fn mean_cycle_s(trace: &Trace) -> Option<f64> {
 }
 
 /// Indices of the maxima to which `values` rise by at least `prominence`, and from which they fall by as much.
-pub(super) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
+pub(crate) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
     let mut maxima = Vec::new();
     let mut rising = false;
     // The furthest point in the present direction.

@@ -9,6 +9,7 @@ mod equilibria;
 mod faults;
 mod image;
 mod lyapunov;
+mod map;
 mod nonlinearity;
 mod orbit;
 mod output;
@@ -71,6 +72,7 @@ enum Command {
     Spectrum(spectrum::Arguments),
     Tires(tires::Arguments),
     Nonlinearity(nonlinearity::Arguments),
+    Map(map::Arguments),
     Schedule(schedule::Arguments),
     Realisability(realisability::Arguments),
     Faults(faults::Arguments),
@@ -119,6 +121,7 @@ pub fn main() -> ExitCode {
         Command::Spectrum(arguments) => spectrum::run(&arguments),
         Command::Tires(arguments) => tires::run(&arguments),
         Command::Nonlinearity(arguments) => nonlinearity::run(&arguments),
+        Command::Map(arguments) => map::run(&arguments),
         Command::Schedule(arguments) => schedule::run(&arguments),
         Command::Realisability(arguments) => realisability::run(&arguments),
         Command::Faults(arguments) => faults::run(&arguments),

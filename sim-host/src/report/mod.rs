@@ -12,6 +12,7 @@ mod text;
 
 pub use figure::drive::draw as drive;
 pub use figure::fault_matrix::draw as fault_matrix;
+pub use figure::motion_map::draw as motion_map;
 pub use figure::schedule_map::draw as schedule_map;
 
 use crate::closed_loop::run::Run;

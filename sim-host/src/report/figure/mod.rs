@@ -1,14 +1,17 @@
 //! The figures, each an SVG document.
 
 pub(super) mod axis;
+mod colour_scale;
 mod divergence;
 pub(super) mod drive;
 pub(super) mod fault_matrix;
 mod instructions;
+pub(super) mod motion_map;
 mod one_step_defect;
 pub(super) mod panel;
 mod phase_portrait;
 mod pwm_trace;
+mod raster;
 pub(super) mod reduce;
 pub(super) mod schedule_map;
 pub(super) mod style;

@@ -1,0 +1,332 @@
+//! `sim-host map`: exponent, period and extent of the motion over wheel speed and dither amplitude.
+
+use super::output::{Output, check_free};
+use super::{ConfigOptions, Done};
+use anyhow::{bail, ensure};
+use clap::{Args, Subcommand, ValueEnum};
+use indicatif::{ProgressBar, ProgressStyle};
+use shared_model::dither::Waveform;
+use sim_host::chaos::sweep::{Timing, Watch};
+use sim_host::config::validate;
+use sim_host::map::cell::{Cell, Kind};
+use sim_host::map::plan::{CELLS_A_TILE, Grid, Plan, Sheet, Start};
+use sim_host::map::table;
+use sim_host::map::tiles::{Folder, Shard, plan_of, put_together};
+use sim_host::pil::qemu::INTERRUPTED;
+use sim_host::report::motion_map;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// The motion over wheel speed N and dither amplitude W: largest Lyapunov exponent, period, extent and kind in each cell.
+///
+/// The dither acts through its mean and from the start. Period and extent come from the turning points of what is behind the
+/// transient, the exponent from a tangent vector along it. Cells are made in tiles; each is kept in the work folder as soon as it is
+/// done. Ctrl-C ends after the present tiles, and the same command goes on from there. The files are the same to the byte whatever
+/// the threads, interruptions and shards.
+#[derive(Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    after_help = "Examples:
+  sim-host map --out map.csv --parquet map.parquet --figure map.svg
+  sim-host map --dither square --from 1700 --to 1800 --square-to 0.1 --speeds 64 --amplitudes 64 --figure detail.svg
+  sim-host map --shard 1/2 --work one       on one machine, and on another
+  sim-host map --shard 2/2 --work two
+  sim-host map merge one two --out map.csv  then puts both together"
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    command: Option<Action>,
+    #[command(flatten)]
+    config: ConfigOptions,
+    /// Waveforms of the dither
+    #[arg(long, value_enum, default_value_t = Dither::Both)]
+    dither: Dither,
+    /// Starts: the scenario's, the one with the opposite signs, or both
+    #[arg(long, value_enum, default_value_t = Starts::Given)]
+    start: Starts,
+    /// Least wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 1000.0,
+        allow_negative_numbers = true
+    )]
+    from: f64,
+    /// Greatest wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 2000.0,
+        allow_negative_numbers = true
+    )]
+    to: f64,
+    /// Greatest amplitude of the square wave, V
+    #[arg(
+        long,
+        value_name = "VOLTS",
+        default_value_t = 0.2,
+        allow_negative_numbers = true
+    )]
+    square_to: f64,
+    /// Greatest amplitude of the sine, V
+    #[arg(
+        long,
+        value_name = "VOLTS",
+        default_value_t = 2.0,
+        allow_negative_numbers = true
+    )]
+    sine_to: f64,
+    /// Wheel speeds, both ends among them
+    #[arg(long, value_name = "COUNT", default_value_t = 256)]
+    speeds: usize,
+    /// Amplitudes from 0 on, both ends among them
+    #[arg(long, value_name = "COUNT", default_value_t = 256)]
+    amplitudes: usize,
+    /// What of each run is not looked at, s
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 100.0,
+        allow_negative_numbers = true
+    )]
+    transient: f64,
+    /// Length of each run, s
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 200.0,
+        allow_negative_numbers = true
+    )]
+    time: f64,
+    /// Folder of the tiles [default: the first file's name with `.tiles` behind it]
+    #[arg(long, value_name = "DIR")]
+    work: Option<PathBuf>,
+    /// Make only the I-th of N shares of the tiles, for `map merge`
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["out", "parquet", "figure"], requires = "work")]
+    shard: Option<Shard>,
+    #[command(flatten)]
+    files: Files,
+}
+
+#[derive(Subcommand)]
+enum Action {
+    Merge(Merge),
+}
+
+/// Puts the tiles of several work folders together. The plan is theirs.
+#[derive(Args)]
+struct Merge {
+    /// The work folders
+    #[arg(value_name = "DIR", required = true)]
+    folders: Vec<PathBuf>,
+    #[command(flatten)]
+    files: Files,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Dither {
+    Square,
+    Sine,
+    Both,
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Starts {
+    Given,
+    Mirrored,
+    Both,
+}
+
+/// The map's files.
+#[derive(Args)]
+struct Files {
+    /// Write the cells as CSV
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Write the cells as Parquet
+    #[arg(long, value_name = "FILE")]
+    parquet: Option<PathBuf>,
+    /// Draw the map as an SVG figure
+    #[arg(long, value_name = "FILE")]
+    figure: Option<PathBuf>,
+    /// Overwrite files that exist
+    #[arg(long)]
+    force: bool,
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    if let Some(Action::Merge(merge)) = &arguments.command {
+        return merge.run();
+    }
+    let plan = arguments.plan()?;
+    arguments.files.check_free()?;
+    let work = match (&arguments.work, arguments.files.all().next()) {
+        (Some(work), _) => work.clone(),
+        (None, Some(file)) => {
+            let mut name = file.clone().into_os_string();
+            name.push(".tiles");
+            name.into()
+        }
+        (None, None) => bail!("nothing to make: give --out, --parquet, --figure or --work"),
+    };
+    let folder = Folder::make(&work, &plan)?;
+    let shard = arguments.shard.unwrap_or(Shard::ALL);
+    fill(&folder, shard)?;
+    let missing = folder.missing(shard).len();
+    if missing > 0 {
+        bail!(
+            "interrupted: {missing} tiles are still to be made; the same command goes on from those in {}",
+            work.display()
+        );
+    }
+    if arguments.shard.is_some() {
+        println!("the shard is complete: {}", work.display());
+        return Ok(Done::Well);
+    }
+    let cells = put_together(&[folder])?;
+    arguments.files.write(&plan, &cells)?;
+    show(&plan, &cells);
+    println!(
+        "tiles: {}, to be deleted when no longer needed",
+        work.display()
+    );
+    Ok(Done::Well)
+}
+
+/// Makes the missing tiles with progress on a terminal.
+fn fill(folder: &Folder, shard: Shard) -> anyhow::Result<()> {
+    let template = "{elapsed_precise} [{bar:40}] {pos}/{len} cells, {per_sec}, {eta} left";
+    let style = ProgressStyle::with_template(template)
+        .expect("the template is valid")
+        .progress_chars("=> ");
+    let cells = folder.missing(shard).len() * CELLS_A_TILE;
+    let bar = ProgressBar::new(cells as u64).with_style(style);
+    let watch = Watch {
+        stop: &INTERRUPTED,
+        done: &|| bar.inc(CELLS_A_TILE as u64),
+    };
+    let filled = folder.fill(shard, watch);
+    bar.finish_and_clear();
+    filled
+}
+
+impl Arguments {
+    fn plan(&self) -> anyhow::Result<Plan> {
+        let scenario = self.config.load()?;
+        validate(&scenario)?;
+        let amplitudes_v = |to| Grid {
+            from: 0.0,
+            to,
+            count: self.amplitudes,
+        };
+        let waveforms = match self.dither {
+            Dither::Square => &[Waveform::Square][..],
+            Dither::Sine => &[Waveform::Sine],
+            Dither::Both => &[Waveform::Square, Waveform::Sine],
+        };
+        let starts = match self.start {
+            Starts::Given => &[Start::Given][..],
+            Starts::Mirrored => &[Start::Mirrored],
+            Starts::Both => &[Start::Given, Start::Mirrored],
+        };
+        let sheet = |start| {
+            waveforms.iter().map(move |&waveform| Sheet {
+                waveform,
+                start,
+                amplitudes_v: amplitudes_v(match waveform {
+                    Waveform::Sine => self.sine_to,
+                    Waveform::Square | Waveform::None => self.square_to,
+                }),
+            })
+        };
+        let speeds_rpm = Grid {
+            from: self.from,
+            to: self.to,
+            count: self.speeds,
+        };
+        let timing = Timing::new(self.transient, self.time)?;
+        let sheets = starts.iter().copied().flat_map(sheet).collect();
+        Ok(Plan::new(scenario, sheets, speeds_rpm, timing)?)
+    }
+}
+
+impl Merge {
+    fn run(&self) -> anyhow::Result<Done> {
+        ensure!(
+            self.files.all().next().is_some(),
+            "nothing to make: give --out, --parquet or --figure"
+        );
+        self.files.check_free()?;
+        let plan = plan_of(&self.folders[0])?;
+        let folders = self.folders.iter();
+        let folders: Vec<Folder> = folders
+            .map(|path| Folder::open(path, &plan))
+            .collect::<Result<_, _>>()?;
+        let cells = put_together(&folders)?;
+        self.files.write(&plan, &cells)?;
+        show(&plan, &cells);
+        Ok(Done::Well)
+    }
+}
+
+impl Files {
+    fn all(&self) -> impl Iterator<Item = &PathBuf> {
+        let files = [&self.out, &self.parquet, &self.figure];
+        files.into_iter().flatten()
+    }
+
+    fn check_free(&self) -> anyhow::Result<()> {
+        self.all().try_for_each(|path| check_free(path, self.force))
+    }
+
+    fn write(&self, plan: &Plan, cells: &[Cell]) -> anyhow::Result<()> {
+        if let Some(path) = &self.out {
+            let mut output = Output::create(path, self.force)?;
+            let mut csv = csv::Writer::from_writer(output.writer());
+            for cell in cells {
+                csv.serialize(cell)?;
+            }
+            csv.flush()?;
+            drop(csv);
+            output.finish()?;
+        }
+        if let Some(path) = &self.parquet {
+            let mut output = Output::create(path, self.force)?;
+            table::write(plan, cells, output.writer())?;
+            output.finish()?;
+        }
+        if let Some(path) = &self.figure {
+            let mut output = Output::create(path, self.force)?;
+            output
+                .writer()
+                .write_all(motion_map(plan, cells)?.as_bytes())?;
+            output.finish()?;
+        }
+        Ok(())
+    }
+}
+
+/// How many cells are of which kind, sheet by sheet.
+fn show(plan: &Plan, cells: &[Cell]) {
+    for (sheet, cells) in plan
+        .sheets
+        .iter()
+        .zip(cells.chunks(cells.len() / plan.sheets.len()))
+    {
+        let share = |kind| {
+            let count = cells.iter().filter(|cell| cell.kind == kind).count();
+            100.0 * count as f64 / cells.len() as f64
+        };
+        println!(
+            "{:?} dither, {:?} start, {} cells: {:.1} % at rest, {:.1} % periodic, {:.1} % chaos, {:.1} % undecided, {:.1} % diverge",
+            sheet.waveform,
+            sheet.start,
+            cells.len(),
+            share(Kind::Equilibrium),
+            share(Kind::Periodic),
+            share(Kind::Chaos),
+            share(Kind::Undecided),
+            share(Kind::Diverges)
+        );
+    }
+}

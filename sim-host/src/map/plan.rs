@@ -1,0 +1,282 @@
+//! Which cells a map has, and the motion of each.
+
+use crate::chaos::sweep::{SweepError, Timing, Values, mirrored};
+use crate::engine::taylor::{Motions, Unfit};
+use serde::{Deserialize, Serialize};
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+
+/// Cells of a tile: so many that no lane of the engine waits long for another.
+pub const CELLS_A_TILE: usize = 128;
+/// Most cells of a map: their rows take some GB.
+pub const MOST_CELLS: usize = 10_000_000;
+
+/// Equally spaced values, both ends among them.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Grid {
+    /// The least, rpm or V.
+    pub from: f64,
+    /// The greatest, rpm or V.
+    pub to: f64,
+    /// How many: at least 2.
+    pub count: usize,
+}
+
+impl Grid {
+    /// Distance of neighbours, rpm or V.
+    pub fn step(&self) -> f64 {
+        (self.to - self.from) / (self.count - 1) as f64
+    }
+
+    /// Value number `k`, from 0 on; rpm or V.
+    pub fn at(&self, k: usize) -> f64 {
+        let share = k as f64 / (self.count - 1) as f64;
+        self.from + share * (self.to - self.from)
+    }
+
+    fn validate(&self, what: &'static str) -> Result<(), PlanError> {
+        if self.count < 2 {
+            return Err(PlanError::TooFew {
+                what,
+                count: self.count,
+            });
+        }
+        Values::new(what, self.from, self.to, self.step().abs())?;
+        Ok(())
+    }
+}
+
+/// Where the motions of a sheet start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// At the scenario's start.
+    Given,
+    /// At the start with the opposite signs, on the other lobe of the steering angle.
+    Mirrored,
+}
+
+/// The cells of one waveform from one start.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sheet {
+    /// The waveform: square wave or sine.
+    pub waveform: Waveform,
+    /// Where the motions start.
+    pub start: Start,
+    /// Its amplitudes W, V.
+    pub amplitudes_v: Grid,
+}
+
+/// What a map is made from: the same plan gives the same map, bit for bit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    /// Version of the program.
+    pub version: String,
+    /// The vehicle and its start. Wheel speed, waveform and amplitude are those of each cell; the dither acts through its mean and
+    /// from the start.
+    pub scenario: Scenario<f64>,
+    /// The sheets, each with as many amplitudes.
+    pub sheets: Vec<Sheet>,
+    /// The wheel speeds N of all sheets, rpm.
+    pub speeds_rpm: Grid,
+    /// What of each run is not looked at, s.
+    pub transient_s: f64,
+    /// What of each run is looked at, s.
+    pub observed_s: f64,
+}
+
+/// Why a map cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// A range is none.
+    #[error(transparent)]
+    Range(#[from] SweepError),
+    /// An axis of one value or none.
+    #[error("{what}: {count} cells; there must be at least 2")]
+    TooFew {
+        /// What the axis shows.
+        what: &'static str,
+        /// Its cells.
+        count: usize,
+    },
+    /// A map without cells, or with too many to hold.
+    #[error("the map has {cells} cells; it must have 1 to {MOST_CELLS}")]
+    Size {
+        /// Its cells.
+        cells: usize,
+    },
+    /// The engine cannot follow the motions.
+    #[error(transparent)]
+    Unfit(#[from] Unfit),
+}
+
+impl Plan {
+    /// A plan of this version of the program.
+    ///
+    /// # Errors
+    /// If a range is none, a cell's scenario is not valid, or the engine cannot follow its motion.
+    pub fn new(
+        scenario: Scenario<f64>,
+        sheets: Vec<Sheet>,
+        speeds_rpm: Grid,
+        timing: Timing,
+    ) -> Result<Self, PlanError> {
+        let plan = Self {
+            version: env!("CARGO_PKG_VERSION").into(),
+            scenario,
+            sheets,
+            speeds_rpm,
+            transient_s: timing.transient_s,
+            observed_s: timing.observed_s,
+        };
+        plan.speeds_rpm.validate("wheel speed (rpm)")?;
+        for sheet in &plan.sheets {
+            sheet.amplitudes_v.validate("dither amplitude (V)")?;
+        }
+        let cells = plan.cells();
+        if cells == 0 || cells > MOST_CELLS {
+            return Err(PlanError::Size { cells });
+        }
+        Motions::new(&plan.corners())?;
+        Ok(plan)
+    }
+
+    /// Cells in all sheets.
+    pub fn cells(&self) -> usize {
+        let cells = |sheet: &Sheet| {
+            sheet
+                .amplitudes_v
+                .count
+                .saturating_mul(self.speeds_rpm.count)
+        };
+        let cells = self.sheets.iter().map(cells);
+        cells.fold(0, usize::saturating_add)
+    }
+
+    /// Tiles of the map.
+    pub fn tiles(&self) -> usize {
+        self.cells().div_ceil(CELLS_A_TILE)
+    }
+
+    /// Where each cell of a tile lies. Cells are counted by sheet, therein by wheel speed, therein by amplitude.
+    pub fn places(&self, tile: usize) -> Vec<Place> {
+        let first = tile * CELLS_A_TILE;
+        let last = self.cells().min(first + CELLS_A_TILE);
+        (first..last).map(|cell| self.place(cell)).collect()
+    }
+
+    fn place(&self, cell: usize) -> Place {
+        let amplitudes = self.sheets[0].amplitudes_v.count;
+        let (column, amplitude) = (cell / amplitudes, cell % amplitudes);
+        let (sheet, speed) = (
+            column / self.speeds_rpm.count,
+            column % self.speeds_rpm.count,
+        );
+        self.place_at(&self.sheets[sheet], speed, amplitude)
+    }
+
+    fn place_at(&self, sheet: &Sheet, speed: usize, amplitude: usize) -> Place {
+        Place {
+            waveform: sheet.waveform,
+            start: sheet.start,
+            wheel_speed_rpm: self.speeds_rpm.at(speed),
+            dither_amplitude_v: sheet.amplitudes_v.at(amplitude),
+        }
+    }
+
+    /// The motion of a cell.
+    pub fn motion(&self, place: &Place) -> Scenario<f64> {
+        let mut scenario = self.scenario;
+        scenario.run.wheel_speed_rpm = place.wheel_speed_rpm;
+        scenario.dither.waveform = place.waveform;
+        scenario.dither.amplitude_v = place.dither_amplitude_v;
+        match place.start {
+            Start::Given => scenario,
+            Start::Mirrored => mirrored(&scenario),
+        }
+    }
+
+    /// The motions of each sheet at the ends of its axes: all parameters have one range, so the cells between are valid too.
+    fn corners(&self) -> Vec<Scenario<f64>> {
+        let ends = |grid: &Grid| [0, grid.count - 1];
+        let of_sheet = |sheet: &Sheet| {
+            ends(&self.speeds_rpm).map(|speed| {
+                ends(&sheet.amplitudes_v)
+                    .map(|amplitude| self.motion(&self.place_at(sheet, speed, amplitude)))
+            })
+        };
+        let sheets = self.sheets.iter().flat_map(of_sheet);
+        sheets.flatten().collect()
+    }
+}
+
+/// Where a cell lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Place {
+    /// The dither's waveform.
+    pub waveform: Waveform,
+    /// Where the motion starts.
+    pub start: Start,
+    /// Wheel speed N, rpm.
+    pub wheel_speed_rpm: f64,
+    /// Dither amplitude W, V.
+    pub dither_amplitude_v: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GRID: Grid = Grid {
+        from: 0.0,
+        to: 0.2,
+        count: 21,
+    };
+
+    fn plan() -> Plan {
+        let sheet = |waveform| Sheet {
+            waveform,
+            start: Start::Given,
+            amplitudes_v: GRID,
+        };
+        let speeds_rpm = Grid {
+            from: 1000.0,
+            to: 2000.0,
+            count: 11,
+        };
+        let sheets = vec![sheet(Waveform::Square), sheet(Waveform::Sine)];
+        let timing = Timing::new(1.0, 2.0).unwrap();
+        Plan::new(Scenario::reconstruction(), sheets, speeds_rpm, timing).unwrap()
+    }
+
+    #[test]
+    fn the_tiles_hold_each_cell_once_in_order() {
+        let plan = plan();
+        let places: Vec<Place> = (0..plan.tiles()).flat_map(|n| plan.places(n)).collect();
+        assert_eq!((places.len(), plan.cells()), (462, 462));
+        let ends = [places[0], places[461]];
+        assert_eq!(ends.map(|p| p.waveform), [Waveform::Square, Waveform::Sine]);
+        assert_eq!(ends.map(|p| p.wheel_speed_rpm), [1000.0, 2000.0]);
+        assert_eq!(ends.map(|p| p.dither_amplitude_v), [0.0, 0.2]);
+        let key = |p: &Place| {
+            (
+                p.waveform == Waveform::Sine,
+                p.wheel_speed_rpm,
+                p.dither_amplitude_v,
+            )
+        };
+        assert!(places.is_sorted_by(|a, b| key(a) < key(b)));
+    }
+
+    #[test]
+    fn a_plan_is_read_back_as_it_was_written() {
+        let mut plan = plan();
+        plan.scenario.vehicle.mass_kg = 1234.567_890_123_456_7;
+        let json = serde_json::to_string(&plan).unwrap();
+        let read: Plan = serde_json::from_str(&json).unwrap();
+        assert_eq!(read, plan);
+    }
+}

@@ -1,0 +1,171 @@
+//! The map as a Parquet table: the columns of the CSV, and the plan beside them.
+
+use super::cell::Cell;
+use super::plan::Plan;
+use parquet::basic::{LogicalType, Repetition, Type as Physical};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::Type;
+use serde::Serialize;
+use std::io::Write;
+use std::sync::Arc;
+
+/// Key of the file's metadata under which the plan is, as JSON.
+pub const PLAN_KEY: &str = "plan";
+
+/// A column: its name, and the values of the cells.
+struct Column {
+    name: &'static str,
+    values: Values,
+}
+
+/// Values of a column; one that a cell may lack is none there.
+enum Values {
+    Names(Vec<ByteArray>),
+    Numbers(Vec<f64>),
+    NumbersOrNone(Vec<Option<f64>>),
+    CountsOrNone(Vec<Option<u32>>),
+}
+
+/// Writes the table. Its bytes depend on plan and cells alone.
+///
+/// # Errors
+/// If the writer fails.
+pub fn write(plan: &Plan, cells: &[Cell], to: impl Write + Send) -> anyhow::Result<()> {
+    let columns = columns(cells)?;
+    let fields = columns.iter().map(Column::field);
+    let fields = fields.collect::<Result<Vec<_>, _>>()?;
+    let schema = Type::group_type_builder("map")
+        .with_fields(fields)
+        .build()?;
+    let plan = KeyValue::new(PLAN_KEY.into(), serde_json::to_string(plan)?);
+    let properties = WriterProperties::builder()
+        .set_created_by(concat!("sim-host ", env!("CARGO_PKG_VERSION")).into())
+        .set_key_value_metadata(Some(vec![plan]))
+        .build();
+    let mut file = SerializedFileWriter::new(to, Arc::new(schema), Arc::new(properties))?;
+    let mut rows = file.next_row_group()?;
+    for column in &columns {
+        column.write(&mut rows)?;
+    }
+    rows.close()?;
+    file.close()?;
+    Ok(())
+}
+
+fn columns(cells: &[Cell]) -> anyhow::Result<Vec<Column>> {
+    let numbers = |name, of: fn(&Cell) -> f64| Column {
+        name,
+        values: Values::Numbers(cells.iter().map(of).collect()),
+    };
+    let numbers_or_none = |name, of: fn(&Cell) -> Option<f64>| Column {
+        name,
+        values: Values::NumbersOrNone(cells.iter().map(of).collect()),
+    };
+    let counts_or_none = |name, of: fn(&Cell) -> Option<u32>| Column {
+        name,
+        values: Values::CountsOrNone(cells.iter().map(of).collect()),
+    };
+    Ok(vec![
+        names("waveform", cells, |cell| cell.waveform)?,
+        names("start", cells, |cell| cell.start)?,
+        numbers("wheel_speed_rpm", |cell| cell.wheel_speed_rpm),
+        numbers("dither_amplitude_v", |cell| cell.dither_amplitude_v),
+        names("kind", cells, |cell| cell.kind)?,
+        counts_or_none("period", |cell| cell.period),
+        counts_or_none("bands", |cell| cell.bands),
+        numbers_or_none("exponent_per_s", |cell| cell.exponent_per_s),
+        numbers_or_none("exponent_standard_error_per_s", |cell| {
+            cell.exponent_standard_error_per_s
+        }),
+        numbers_or_none("exponent_threshold_per_s", |cell| {
+            cell.exponent_threshold_per_s
+        }),
+        numbers_or_none("yaw_rate_peak_to_peak_rad_per_s", |cell| {
+            cell.yaw_rate_peak_to_peak_rad_per_s
+        }),
+        numbers_or_none("steering_angle_peak_to_peak_rad", |cell| {
+            cell.steering_angle_peak_to_peak_rad
+        }),
+        numbers_or_none("diverges_at_s", |cell| cell.diverges_at_s),
+    ])
+}
+
+/// A column of names, as the CSV has them.
+fn names<T: Serialize>(
+    name: &'static str,
+    cells: &[Cell],
+    of: fn(&Cell) -> T,
+) -> anyhow::Result<Column> {
+    let text = |cell| match serde_json::to_value(of(cell))? {
+        serde_json::Value::String(text) => Ok(ByteArray::from(text.into_bytes())),
+        other => anyhow::bail!("{name}: {other} is no name"),
+    };
+    Ok(Column {
+        name,
+        values: Values::Names(cells.iter().map(text).collect::<Result<_, _>>()?),
+    })
+}
+
+impl Column {
+    fn field(&self) -> parquet::errors::Result<Arc<Type>> {
+        let (physical, logical, repetition) = match self.values {
+            Values::Names(_) => (
+                Physical::BYTE_ARRAY,
+                Some(LogicalType::String),
+                Repetition::REQUIRED,
+            ),
+            Values::Numbers(_) => (Physical::DOUBLE, None, Repetition::REQUIRED),
+            Values::NumbersOrNone(_) => (Physical::DOUBLE, None, Repetition::OPTIONAL),
+            Values::CountsOrNone(_) => (Physical::INT32, None, Repetition::OPTIONAL),
+        };
+        let field = Type::primitive_type_builder(self.name, physical)
+            .with_logical_type(logical)
+            .with_repetition(repetition);
+        Ok(Arc::new(field.build()?))
+    }
+
+    fn write<W: Write + Send>(&self, rows: &mut SerializedRowGroupWriter<W>) -> anyhow::Result<()> {
+        let mut column = rows
+            .next_column()?
+            .ok_or_else(|| anyhow::anyhow!("the table has no column {}", self.name))?;
+        match &self.values {
+            Values::Names(names) => {
+                column
+                    .typed::<ByteArrayType>()
+                    .write_batch(names, None, None)?;
+            }
+            Values::Numbers(numbers) => {
+                column
+                    .typed::<DoubleType>()
+                    .write_batch(numbers, None, None)?;
+            }
+            Values::NumbersOrNone(numbers) => {
+                let there: Vec<f64> = numbers.iter().copied().flatten().collect();
+                let levels = levels(numbers);
+                column
+                    .typed::<DoubleType>()
+                    .write_batch(&there, Some(&levels), None)?;
+            }
+            Values::CountsOrNone(counts) => {
+                let there: Vec<i32> = counts.iter().flatten().map(|&n| n as i32).collect();
+                let levels = levels(counts);
+                column
+                    .typed::<Int32Type>()
+                    .write_batch(&there, Some(&levels), None)?;
+            }
+        }
+        column.close()?;
+        Ok(())
+    }
+}
+
+/// Which values are there: 1, else 0.
+fn levels<T>(values: &[Option<T>]) -> Vec<i16> {
+    values
+        .iter()
+        .map(|value| i16::from(value.is_some()))
+        .collect()
+}

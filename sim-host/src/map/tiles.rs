@@ -1,0 +1,244 @@
+//! The tiles of a map, each in a file that is complete or not there.
+//!
+//! A tile's file is a line of JSON, with the tile's number and the whole plan, and below it the rows of its cells as CSV. What one
+//! run leaves, another goes on from; what several machines make is put together.
+
+use super::cell::{Cell, cells};
+use super::plan::{Place, Plan};
+use crate::chaos::sweep::Watch;
+use crate::report::file::replace;
+use anyhow::{Context, bail, ensure};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Missing tiles that a message names.
+const NAMED: usize = 10;
+
+/// Every `of`-th tile of a map: what one of several machines makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    index: usize,
+    of: usize,
+}
+
+impl Shard {
+    /// All tiles.
+    pub const ALL: Self = Self { index: 1, of: 1 };
+
+    fn holds(self, tile: usize) -> bool {
+        tile % self.of == self.index - 1
+    }
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    /// From `i/n`: the `i`-th of `n` shards, counted from 1.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/');
+        let numbers = numbers.map(|(index, of)| (index.parse::<usize>(), of.parse::<usize>()));
+        match numbers {
+            Some((Ok(index), Ok(of))) if (1..=of).contains(&index) => Ok(Self { index, of }),
+            _ => Err("must be i/n with i from 1 to n, for instance 2/4".into()),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    tile: usize,
+    plan: Plan,
+}
+
+/// A folder with tiles of one plan.
+#[derive(Debug)]
+pub struct Folder<'a> {
+    path: PathBuf,
+    plan: &'a Plan,
+}
+
+impl<'a> Folder<'a> {
+    /// Opens a folder for the tiles of a plan, and makes it if it is not there.
+    ///
+    /// # Errors
+    /// If it cannot be made, or holds a tile of another plan.
+    pub fn make(path: &Path, plan: &'a Plan) -> anyhow::Result<Self> {
+        fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))?;
+        Self::open(path, plan)
+    }
+
+    /// Opens a folder with tiles of a plan.
+    ///
+    /// # Errors
+    /// If it is not there, or holds a tile of another plan.
+    pub fn open(path: &Path, plan: &'a Plan) -> anyhow::Result<Self> {
+        let folder = Self {
+            path: path.into(),
+            plan,
+        };
+        if let Some(other) = first_tile(path)? {
+            let plan = header(&other)?.plan;
+            ensure!(
+                plan == *folder.plan,
+                "{} holds tiles of another map: {}; give another --work, or delete them",
+                path.display(),
+                difference(&plan, folder.plan)
+            );
+        }
+        Ok(folder)
+    }
+
+    /// Computes the tiles of a shard that are not there yet, several at once, and keeps each as soon as it is done. Those not begun
+    /// when it is asked to stop are left out.
+    ///
+    /// # Errors
+    /// If a tile cannot be computed or written.
+    pub fn fill(&self, shard: Shard, watch: Watch) -> anyhow::Result<()> {
+        let make = |&tile: &usize| self.write(tile, &cells(self.plan, &self.plan.places(tile))?);
+        let made = watch.points(&self.missing(shard), make);
+        made.into_iter().flatten().collect()
+    }
+
+    /// Tiles of a shard that are not there.
+    pub fn missing(&self, shard: Shard) -> Vec<usize> {
+        let tiles = (0..self.plan.tiles()).filter(|&tile| shard.holds(tile));
+        tiles.filter(|&tile| !self.file(tile).exists()).collect()
+    }
+
+    fn file(&self, tile: usize) -> PathBuf {
+        self.path.join(format!("tile-{tile:06}.csv"))
+    }
+
+    fn write(&self, tile: usize, cells: &[Cell]) -> anyhow::Result<()> {
+        let plan = self.plan.clone();
+        let header = serde_json::to_string(&Header { tile, plan })?;
+        let mut csv = csv::Writer::from_writer(Vec::new());
+        for cell in cells {
+            csv.serialize(cell)?;
+        }
+        let rows = String::from_utf8(csv.into_inner()?)?;
+        replace(&self.file(tile), &format!("{header}\n{rows}"))
+    }
+
+    fn read(&self, tile: usize) -> anyhow::Result<Vec<Cell>> {
+        let file = self.file(tile);
+        let cells = || -> anyhow::Result<Vec<Cell>> {
+            let text = fs::read_to_string(&file)?;
+            let (first, rows) = text.split_once('\n').context("it has no rows")?;
+            let header: Header = serde_json::from_str(first)?;
+            ensure!(
+                header.plan == *self.plan,
+                "it is of another map: {}",
+                difference(&header.plan, self.plan)
+            );
+            ensure!(header.tile == tile, "it is tile {}", header.tile);
+            let cells = csv::Reader::from_reader(rows.as_bytes())
+                .into_deserialize()
+                .collect::<Result<Vec<Cell>, _>>()?;
+            let places: Vec<Place> = cells.iter().map(place).collect();
+            ensure!(
+                places == self.plan.places(tile),
+                "its cells are not complete"
+            );
+            Ok(cells)
+        };
+        cells().with_context(|| format!("cannot use {}; delete it to make it anew", file.display()))
+    }
+}
+
+fn place(cell: &Cell) -> Place {
+    Place {
+        waveform: cell.waveform,
+        start: cell.start,
+        wheel_speed_rpm: cell.wheel_speed_rpm,
+        dither_amplitude_v: cell.dither_amplitude_v,
+    }
+}
+
+/// The plan of the tiles in a folder.
+///
+/// # Errors
+/// If there is none, or it cannot be read.
+pub fn plan_of(path: &Path) -> anyhow::Result<Plan> {
+    let tile = first_tile(path)?.with_context(|| format!("{} has no tiles", path.display()))?;
+    Ok(header(&tile)?.plan)
+}
+
+/// All cells of a map from tiles in one or several folders, in the map's order.
+///
+/// # Errors
+/// If a tile is in none of them, or one is of another plan or damaged.
+pub fn put_together(folders: &[Folder]) -> anyhow::Result<Vec<Cell>> {
+    let plan = folders.first().context("there is no folder")?.plan;
+    let holder = |tile| folders.iter().find(|folder| folder.file(tile).exists());
+    let all = 0..plan.tiles();
+    let missing: Vec<_> = all.clone().filter(|&tile| holder(tile).is_none()).collect();
+    if !missing.is_empty() {
+        let named: Vec<_> = missing.iter().take(NAMED).map(usize::to_string).collect();
+        let more = if missing.len() > NAMED { ", ..." } else { "" };
+        bail!(
+            "{} of {} tiles are missing: {}{more}",
+            missing.len(),
+            plan.tiles(),
+            named.join(", ")
+        );
+    }
+    let mut cells = Vec::with_capacity(plan.cells());
+    for (tile, folder) in all.filter_map(|tile| Some((tile, holder(tile)?))) {
+        cells.extend(folder.read(tile)?);
+    }
+    Ok(cells)
+}
+
+/// The first tile's file of a folder, by name.
+fn first_tile(path: &Path) -> anyhow::Result<Option<PathBuf>> {
+    let entries = fs::read_dir(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let files = entries.collect::<Result<Vec<_>, _>>()?;
+    let is_tile = |file: &PathBuf| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("tile-") && name.ends_with(".csv")
+    };
+    let files = files.iter().map(fs::DirEntry::path);
+    Ok(files.filter(is_tile).min())
+}
+
+fn header(file: &Path) -> anyhow::Result<Header> {
+    let unusable = || format!("cannot use {}; delete it to make it anew", file.display());
+    let text = fs::read_to_string(file).with_context(unusable)?;
+    serde_json::from_str(text.lines().next().unwrap_or_default()).with_context(unusable)
+}
+
+/// In what two plans differ, in words.
+fn difference(theirs: &Plan, ours: &Plan) -> String {
+    let value = |plan| serde_json::to_value(plan).unwrap_or_default();
+    let mut differences = Vec::new();
+    differ("", &value(theirs), &value(ours), &mut differences);
+    differences.join(", ")
+}
+
+/// Collects the keys at which two values differ, with both.
+fn differ(
+    key: &str,
+    theirs: &serde_json::Value,
+    ours: &serde_json::Value,
+    differences: &mut Vec<String>,
+) {
+    match (theirs.as_object(), ours.as_object()) {
+        (Some(theirs), Some(ours)) => {
+            for (name, value) in theirs {
+                let key = if key.is_empty() {
+                    name.clone()
+                } else {
+                    format!("{key}.{name}")
+                };
+                let ours = ours.get(name).unwrap_or(&serde_json::Value::Null);
+                differ(&key, value, ours, differences);
+            }
+        }
+        _ if theirs != ours => {
+            differences.push(format!("their {key} is {theirs}, not {ours}"));
+        }
+        _ => {}
+    }
+}

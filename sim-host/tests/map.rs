@@ -1,0 +1,271 @@
+//! The map: the same bytes however it is made, against the analysis of single motions, and bad input.
+
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::RowAccessor;
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use sim_host::chaos::attractor::{Kind, attractor};
+use sim_host::chaos::sweep::Timing;
+use sim_host::map::cell::{self, Cell, cells};
+use sim_host::map::plan::{Grid, Place, Plan, Sheet, Start};
+use sim_host::map::table::PLAN_KEY;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// A map of 288 cells in three tiles, the last one not full.
+const SMALL: &str = "map --speeds 12 --amplitudes 12 --transient 5 --time 15";
+
+fn sim_host(folder: &Path, threads: &str, line: &str) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_sim-host"))
+        .args(line.split_whitespace())
+        .env("RAYON_NUM_THREADS", threads)
+        .current_dir(folder)
+        .output()
+        .expect("the program starts")
+}
+
+fn assert_well(folder: &Path, threads: &str, line: &str) {
+    let output = sim_host(folder, threads, line);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{line}: {message}");
+}
+
+/// Expects exit code 2, a message with all of `parts`, and no file `o.csv`.
+fn assert_refused(folder: &Path, line: &str, parts: &[&str]) {
+    let output = sim_host(folder, "2", line);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{line}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{line}: {message} lacks {part:?}");
+    }
+    assert!(!folder.join("o.csv").exists(), "{line}");
+}
+
+fn files(name: &str) -> String {
+    format!("--out {name}.csv --parquet {name}.parquet --figure {name}.svg")
+}
+
+fn assert_same(folder: &Path, one: &str, other: &str) {
+    for kind in ["csv", "parquet", "svg"] {
+        let read = |name| fs::read(folder.join(format!("{name}.{kind}"))).expect("it is written");
+        assert!(
+            read(one) == read(other),
+            "{one} and {other} differ in {kind}"
+        );
+    }
+}
+
+#[test]
+fn the_same_bytes_for_any_threads_interruptions_and_shards() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert_well(at, "1", &format!("{SMALL} {}", files("one")));
+    assert_well(at, "2", &format!("{SMALL} {}", files("two")));
+    assert_same(at, "one", "two");
+    // As after an interruption: some tiles are there.
+    fs::remove_file(at.join("two.csv.tiles/tile-000001.csv")).unwrap();
+    assert_well(
+        at,
+        "2",
+        &format!("{SMALL} --work two.csv.tiles {}", files("again")),
+    );
+    assert_same(at, "one", "again");
+    assert_well(at, "1", &format!("{SMALL} --shard 1/2 --work a"));
+    assert_refused(
+        at,
+        "map merge a --out o.csv",
+        &["1 of 3 tiles", "missing: 1"],
+    );
+    assert_well(at, "2", &format!("{SMALL} --shard 2/2 --work b"));
+    assert_well(at, "1", &format!("map merge b a {}", files("merged")));
+    assert_same(at, "one", "merged");
+}
+
+#[test]
+fn tiles_of_another_plan_or_damaged_ones_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let small = "map --dither square --speeds 12 --amplitudes 12 --transient 5";
+    assert_well(at, "2", &format!("{small} --time 15 --work w"));
+    let another = format!("{small} --time 16 --work w --out o.csv");
+    let parts = ["tiles of another map", "observed_s is 10.0, not 11.0"];
+    assert_refused(at, &another, &parts);
+    assert_well(at, "2", &format!("{small} --time 16 --work v --shard 1/1"));
+    assert_refused(at, "map merge w v --out o.csv", &["v", "another map"]);
+    let tile = at.join("w/tile-000000.csv");
+    let text = fs::read_to_string(&tile).unwrap();
+    let (cut, _) = text.trim_end().rsplit_once('\n').unwrap();
+    fs::write(&tile, cut).unwrap();
+    let parts = ["tile-000000.csv", "not complete", "delete it"];
+    assert_refused(at, "map merge w --out o.csv", &parts);
+    fs::write(&tile, "no tile").unwrap();
+    assert_refused(at, "map merge w --out o.csv", &["cannot use", "delete it"]);
+    fs::create_dir(at.join("empty")).unwrap();
+    assert_refused(at, "map merge empty --out o.csv", &["empty has no tiles"]);
+}
+
+#[test]
+fn bad_input_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (rest, parts) in [
+        ("--shard 0/3 --work w", &["0/3", "i from 1 to n"][..]),
+        ("--shard 4/3 --work w", &["4/3", "i from 1 to n"]),
+        ("--shard 1/0 --work w", &["1/0", "i from 1 to n"]),
+        ("--shard one --work w", &["one", "2/4"]),
+        ("--shard 1/2", &["--work"]),
+        ("--shard 1/2 --work w --out o.csv", &["--shard", "--out"]),
+        ("--out o.csv --from nan", &["wheel speed", "NaN", "finite"]),
+        (
+            "--out o.csv --from 2000 --to 1000",
+            &["wheel speed", "from 2000 to 1000", "reversed"],
+        ),
+        ("--out o.csv --from -5", &["wheel_speed_rpm = -5", "from 1"]),
+        (
+            "--out o.csv --square-to -0.1",
+            &["amplitude", "-0.1", "reversed"],
+        ),
+        ("--out o.csv --sine-to inf", &["amplitude", "inf", "finite"]),
+        (
+            "--out o.csv --speeds 1",
+            &["wheel speed", "1 cells", "at least 2"],
+        ),
+        (
+            "--out o.csv --amplitudes 0",
+            &["amplitude", "0 cells", "at least 2"],
+        ),
+        (
+            "--out o.csv --speeds 100000 --amplitudes 100000",
+            &["20000000000 cells", "1 to 10000000"],
+        ),
+        (
+            "--out o.csv --transient 200",
+            &["transient of 200 s", "shorter"],
+        ),
+        ("--out o.csv --time nan", &["NaN s"]),
+        (
+            "--out o.csv --preset printed",
+            &["cubic tyre at small slip angles"],
+        ),
+        ("", &["--out, --parquet, --figure or --work"]),
+    ] {
+        assert_refused(at, &format!("map {rest}"), parts);
+    }
+    fs::write(at.join("there.csv"), "mine").unwrap();
+    assert_refused(
+        at,
+        &format!("{SMALL} --out there.csv"),
+        &["there.csv exists", "--force"],
+    );
+}
+
+/// One cell as `sim-host map` makes it.
+fn found(waveform: Waveform, wheel_speed_rpm: f64, dither_amplitude_v: f64) -> (Plan, Cell) {
+    let place = Place {
+        waveform,
+        start: Start::Given,
+        wheel_speed_rpm,
+        dither_amplitude_v,
+    };
+    let grid = |value| Grid {
+        from: value,
+        to: value + 0.1,
+        count: 2,
+    };
+    let sheet = Sheet {
+        waveform,
+        start: Start::Given,
+        amplitudes_v: grid(dither_amplitude_v),
+    };
+    let timing = Timing::new(100.0, 200.0).unwrap();
+    let speeds_rpm = grid(wheel_speed_rpm);
+    let plan = Plan::new(Scenario::reconstruction(), vec![sheet], speeds_rpm, timing).unwrap();
+    let cell = cells(&plan, &[place]).unwrap()[0];
+    (plan, cell)
+}
+
+/// The other integrator, and the exponent by the linearised step.
+#[test]
+fn cells_agree_with_the_analysis_of_the_motion() {
+    for (waveform, rpm, volts) in [
+        (Waveform::Square, 1600.0, 0.0),
+        (Waveform::Square, 1750.0, 0.0),
+        (Waveform::Square, 1750.0, 0.1),
+        (Waveform::Square, 1840.0, 0.0),
+        (Waveform::Square, 1750.0, 0.19),
+        (Waveform::Sine, 1750.0, 1.0),
+    ] {
+        let (plan, cell) = found(waveform, rpm, volts);
+        let place = plan.places(0)[0];
+        let timing = Timing::new(100.0, 200.0).unwrap();
+        let known = attractor(&plan.motion(&place), timing, true).unwrap();
+        let case = format!("{cell:?} {known:?}");
+        let kind = match known.kind {
+            Kind::Equilibrium => (cell::Kind::Equilibrium, Some(0)),
+            Kind::Periodic(maxima) => (cell::Kind::Periodic, Some(maxima as u32)),
+            Kind::Chaos | Kind::BandedChaos(_) => (cell::Kind::Chaos, None),
+            Kind::Undecided => (cell::Kind::Undecided, None),
+            Kind::Diverges => panic!("{case}"),
+        };
+        assert_eq!((cell.kind, cell.period), kind, "{case}");
+        let (low, high) = known.yaw_rates_rad_per_s();
+        let close = if kind.1.is_some() { 1e-3 } else { 0.05 };
+        let extent = cell.yaw_rate_peak_to_peak_rad_per_s.unwrap();
+        assert!((extent - (high - low)).abs() <= close * extent, "{case}");
+        if let Some(exponent) = known.exponent_per_s {
+            let both =
+                cell.exponent_threshold_per_s.unwrap() + known.exponent_threshold_per_s.unwrap();
+            assert!(
+                (cell.exponent_per_s.unwrap() - exponent).abs() <= both,
+                "{case}"
+            );
+        }
+    }
+}
+
+#[test]
+fn csv_and_parquet_hold_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    assert_well(at, "2", &format!("{SMALL} --start both {}", files("map")));
+    let mut csv = csv::Reader::from_path(at.join("map.csv")).unwrap();
+    let cells: Vec<Cell> = csv.deserialize().collect::<Result<_, _>>().unwrap();
+    assert_eq!(cells.len(), 576);
+    let file = fs::File::open(at.join("map.parquet")).unwrap();
+    let table = SerializedFileReader::new(file).unwrap();
+    let metadata = table.metadata().file_metadata();
+    let columns = metadata.schema_descr().columns().iter();
+    let columns: Vec<_> = columns.map(|column| column.name().to_owned()).collect();
+    let header = csv.headers().unwrap();
+    assert_eq!(columns, header.iter().collect::<Vec<_>>());
+    let keys = metadata.key_value_metadata().unwrap();
+    let plan = keys.iter().find(|pair| pair.key == PLAN_KEY).unwrap();
+    let plan: Plan = serde_json::from_str(plan.value.as_ref().unwrap()).unwrap();
+    assert_eq!(plan.cells(), cells.len());
+    let rows = table.get_row_iter(None).unwrap();
+    let mut read = 0;
+    for (row, cell) in rows.zip(&cells) {
+        let row = row.unwrap();
+        let name = |k| row.get_string(k).unwrap().clone();
+        assert_eq!(name(0), format!("{:?}", cell.waveform).to_lowercase());
+        assert_eq!(name(1), format!("{:?}", cell.start).to_lowercase());
+        assert_eq!(name(4), format!("{:?}", cell.kind).to_lowercase());
+        let count = |k| row.get_int(k).ok().map(|n| n as u32);
+        assert_eq!([count(5), count(6)], [cell.period, cell.bands]);
+        let numbers = [2, 3, 7, 8, 9, 10, 11, 12].map(|k| row.get_double(k).ok());
+        let of_csv = [
+            Some(cell.wheel_speed_rpm),
+            Some(cell.dither_amplitude_v),
+            cell.exponent_per_s,
+            cell.exponent_standard_error_per_s,
+            cell.exponent_threshold_per_s,
+            cell.yaw_rate_peak_to_peak_rad_per_s,
+            cell.steering_angle_peak_to_peak_rad,
+            cell.diverges_at_s,
+        ];
+        assert_eq!(numbers, of_csv);
+        read += 1;
+    }
+    assert_eq!(read, cells.len());
+}
