@@ -197,10 +197,12 @@ fn a_search_without_result_is_untested_and_names_its_interval() {
 fn stopping_keeps_what_is_done() {
     let folder = folder();
     let range = [
-        "--from", "1500", "--to", "1999", "--step", "1", "--time", "1200",
+        "--from", "1500", "--to", "1999", "--step", "1", "--time", "20000",
     ];
     let outputs = ["--out", "x.csv", "--json", "x.json"];
+    // One thread: eight batches.
     let child = command(folder.path(), &[&range[..], &outputs].concat())
+        .env("RAYON_NUM_THREADS", "1")
         .spawn()
         .expect("the program starts");
     std::thread::sleep(Duration::from_secs(2));
