@@ -171,10 +171,12 @@ fn a_search_without_result_is_untested_and_names_its_interval() {
 fn stopping_keeps_what_is_done() {
     let folder = folder();
     let range = [
-        "--from", "1500", "--to", "1999", "--step", "1", "--time", "1200",
+        "--from", "1500", "--to", "1999", "--step", "1", "--time", "20000",
     ];
     let outputs = ["--out", "x.csv", "--json", "x.json"];
+    // One thread: eight batches.
     let child = lyapunov(folder.path(), &[&range[..], &outputs].concat())
+        .env("RAYON_NUM_THREADS", "1")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

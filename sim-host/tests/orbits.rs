@@ -2,8 +2,9 @@
 
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
+use shared_model::tire::HIGH_FRICTION_ROAD;
 use sim_host::chaos::attractor::{Kind, attractor};
-use sim_host::chaos::basin::basin;
+use sim_host::chaos::basin::{Cell, basin};
 use sim_host::chaos::equilibria;
 use sim_host::chaos::extrema::Extrema;
 use sim_host::chaos::orbit::{Outcome, Point, Section, Start, diagram};
@@ -11,6 +12,7 @@ use sim_host::chaos::period::yaw_rate_maxima;
 use sim_host::chaos::regions::{Regions, coexisting, regions};
 use sim_host::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, mirrored};
 use sim_host::component::Component;
+use sim_host::engine::reference::Reference;
 use sim_host::simulate::simulate;
 use std::sync::atomic::AtomicBool;
 
@@ -238,10 +240,25 @@ fn starts_end_on_the_attractors_of_both_lobes_or_diverge() {
     let equilibria = equilibria::find(&scenario).expect("valid");
     let holding = equilibria.iter().filter(|e| e.holds(&rest.end)).count();
     assert_eq!(holding, 1, "{rest:?}");
-    // Far out the cubic tyre pushes the vehicle away.
-    let (beta, delta) = (values(8.0, 8.0, 1.0), values(-8.0, -8.0, 1.0));
-    let away = basin(&scenario, &beta, &delta, timing(200.0, 400.0), WATCH).expect("valid");
-    assert_eq!(away.attractors[0].kind, Kind::Diverges);
+    // Where nothing bounds the tyres' force.
+    let mut unbounded = scenario;
+    (unbounded.tires.front, unbounded.tires.rear) = HIGH_FRICTION_ROAD;
+    let away = basin(&unbounded, &betas, &deltas, timing(200.0, 400.0), WATCH).expect("valid");
+    let start = |c: &&Cell| c.sideslip_rad > 0.1 && c.steering_angle_rad > 0.4;
+    let cell = away.cells.iter().find(start).expect("it is on the grid");
+    assert_eq!(away.attractors[cell.attractor].kind, Kind::Diverges);
+}
+
+/// At 16 rad of slip the cubic tyre is so stiff that a step of 1 ms overshoots and diverges. The motion itself comes back.
+#[test]
+fn a_stiff_start_comes_back_from_far_out() {
+    let mut far = at(1600.0);
+    (far.run.sideslip_rad, far.run.steering_angle_rad) = (8.0, -8.0);
+    let mut reference = Reference::new(&far, 1e-10).expect("valid");
+    let back = reference.run(2.0).x;
+    assert!(back.amax() < 10.0, "{back}");
+    let found = attractor(&far, timing(200.0, 400.0), false).expect("valid");
+    assert_eq!(found.kind, Kind::Periodic(2));
 }
 
 /// Friction holds a vehicle that has come to rest: upwards the cycle lasts beyond 1.14 V, downwards rest does.

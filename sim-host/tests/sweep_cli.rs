@@ -50,7 +50,7 @@ fn ranges_are_checked() {
         );
         assert_refused(
             &line("--from 1000 --to 2000 --step 0.04"),
-            &["model steps", "--yes"],
+            &["runs of", "about", "--yes"],
         );
     }
     assert_refused("regions --width 0", &["--width 0", "at least"]);
@@ -117,11 +117,12 @@ fn the_number_of_threads_does_not_change_the_bytes() {
 #[test]
 fn diverging_motions_are_named_and_have_no_numbers() {
     let folder = folder();
-    let start = "[run]\nsideslip_rad = 8\nsteering_angle_rad = -8\n";
-    fs::write(folder.path().join("far.toml"), start).expect("the file can be written");
+    let road = "[tires.front]\nstiffness_per_rad = 6.7651\nshape = 1.3\npeak_n = 6436.8\n\
+                [tires.rear]\nstiffness_per_rad = 9.0051\nshape = 1.3\npeak_n = 5430.0\n";
+    fs::write(folder.path().join("road.toml"), road).expect("the file can be written");
     for analysis in ["orbit", "regions"] {
         let line = format!(
-            "{analysis} --config far.toml --from 1750 --to 1750 --transient 5 --time 10 --out {analysis}.csv --figure f.svg --force"
+            "{analysis} --config road.toml --from 1750 --to 1750 --transient 5 --time 10 --out {analysis}.csv --figure f.svg --force"
         );
         assert_ends(&mut command(folder.path(), line.split_whitespace()), 0);
         let csv =

@@ -1,18 +1,15 @@
 //! What a motion ends on, and whether two motions end on the same.
 
 use crate::chaos::equilibria::Equilibrium;
-use crate::chaos::extrema::Extrema;
-use crate::chaos::lyapunov::{Exponent, largest};
-use crate::chaos::period::{Period, TOLERANCE, period_of_maxima};
-use crate::chaos::sweep::Timing;
-use crate::motion::{Diverged, Motion};
-use crate::simulate::started_at;
-use crate::trace::Trace;
+use crate::chaos::lyapunov::{Exponent, Pieces};
+use crate::chaos::observe::observe;
+use crate::chaos::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
+use crate::chaos::sweep::{Timing, Watch};
+use crate::engine::taylor::{Found, Watched};
+use crate::motion::Diverged;
 use shared_model::vehicle::{STEERING_ANGLE, State, YAW_RATE};
 use shared_model::{InvalidScenario, Scenario};
 
-/// Longest motion along which the exponent is taken, s: its states take 40 MB.
-const LONGEST_EXPONENT_S: f64 = 1000.0;
 /// Share of their joint extent that two motions' extents must have in common to be of the same attractor.
 const COMMON_PERIODIC: f64 = 0.97;
 /// The same for chaotic motions, whose extents are those of a finite time.
@@ -104,6 +101,41 @@ impl Attractor {
         }
     }
 
+    /// Of what is found of a motion; with an exponent if there is a tangent vector.
+    fn of<const K: usize>(found: &Found<K>, timing: Timing) -> Self {
+        if let Some(diverged) = found.diverged {
+            return Self::diverging(diverged, &found.end);
+        }
+        let range = found.upper[YAW_RATE] - found.lower[YAW_RATE];
+        let maxima = maxima_of_turns(&found.turns[YAW_RATE], range);
+        let period = period_of_maxima(&maxima, range, TOLERANCE);
+        let spectrum = Pieces::of(found, timing.observed_s).spectrum();
+        let largest = spectrum.first().copied().flatten();
+        let exponent = largest.filter(|_| period != Period::Equilibrium);
+        let (residual, cycle_s) = match period {
+            Period::Periodic {
+                residual, time_s, ..
+            } => (Some(residual), Some(time_s)),
+            Period::Aperiodic { residual } => (Some(residual), None),
+            Period::Equilibrium | Period::TooShort { .. } => (None, None),
+        };
+        let in_cycle = period.maxima().unwrap_or(maxima.len());
+        let mut heights: Vec<f64> = maxima.iter().take(in_cycle).map(|m| m.1).collect();
+        heights.sort_by(|a, b| b.total_cmp(a));
+        Self {
+            kind: kind(period, exponent, K > 0, &maxima),
+            residual,
+            cycle_s,
+            exponent_per_s: exponent.map(|e| e.per_s),
+            exponent_threshold_per_s: exponent.map(|e| e.threshold_per_s()),
+            maxima_rad_per_s: heights,
+            lower: found.lower,
+            upper: found.upper,
+            end: found.end.x.into(),
+            diverges_at_s: None,
+        }
+    }
+
     /// The side of the steering angle on which it lies.
     pub fn lobe(&self) -> &'static str {
         match (self.lower[STEERING_ANGLE], self.upper[STEERING_ANGLE]) {
@@ -143,11 +175,35 @@ impl Attractor {
     }
 }
 
-/// Follows the scenario's motion through its transient and says what it ends on.
+/// Follows the scenarios' motions through their transients and says what they end on. Results are in the scenarios' order;
+/// motions that were not begun have none.
 ///
 /// The period is that of the yaw rate's maxima over the time observed, to 0.2 % of its range. If `with_exponent`, the
-/// largest Lyapunov exponent along the first 1000 s of it has to agree, positive only where there is no period; else a
-/// motion without period stays undecided, and one with period is taken as such.
+/// largest Lyapunov exponent has to agree, positive only where there is no period; else a motion without period stays
+/// undecided, and one with period is taken as such.
+///
+/// # Errors
+/// If a scenario is not valid.
+pub fn attractors(
+    scenarios: &[Scenario<f64>],
+    timing: Timing,
+    with_exponent: bool,
+    watch: Watch,
+) -> Result<Vec<Option<Attractor>>, InvalidScenario> {
+    let watched = Watched {
+        turns: [true; 4],
+        section: None,
+    };
+    if with_exponent {
+        let see = |_: &_, found: &Found<1>| Attractor::of(found, timing);
+        observe(scenarios, timing, watched, watch, see)
+    } else {
+        let see = |_: &_, found: &Found<0>| Attractor::of(found, timing);
+        observe(scenarios, timing, watched, watch, see)
+    }
+}
+
+/// What the motion of one scenario ends on; as [`attractors`].
 ///
 /// # Errors
 /// If the scenario is not valid.
@@ -156,54 +212,9 @@ pub fn attractor(
     timing: Timing,
     with_exponent: bool,
 ) -> Result<Attractor, InvalidScenario> {
-    let mut motion = Motion::new(scenario)?;
-    if let Err(diverged) = motion.observe(timing.transient_s, |_, _| {}) {
-        return Ok(Attractor::diverging(diverged, motion.state()));
-    }
-    let start = *motion.state();
-    let step_s = motion.step_s();
-    let mut extrema = Extrema::default();
-    let (mut lower, mut upper) = (start.x, start.x);
-    let mut states = Vec::new();
-    let seen = motion.observe(timing.observed_s, |time_s, state| {
-        extrema.push(time_s, step_s, state.x[YAW_RATE]);
-        lower = lower.zip_map(&state.x, f64::min);
-        upper = upper.zip_map(&state.x, f64::max);
-        if with_exponent && time_s <= LONGEST_EXPONENT_S {
-            states.push(*state);
-        }
-    });
-    if let Err(diverged) = seen {
-        let time_s = timing.transient_s + diverged.time_s;
-        return Ok(Attractor::diverging(Diverged { time_s }, &start));
-    }
-    let maxima = extrema.maxima();
-    let period = period_of_maxima(&maxima, extrema.range(), TOLERANCE);
-    let exponent = (with_exponent && period != Period::Equilibrium)
-        .then(|| exponent(scenario, start, step_s, states))
-        .flatten();
-    let (residual, cycle_s) = match period {
-        Period::Periodic {
-            residual, time_s, ..
-        } => (Some(residual), Some(time_s)),
-        Period::Aperiodic { residual } => (Some(residual), None),
-        Period::Equilibrium | Period::TooShort { .. } => (None, None),
-    };
-    let in_cycle = period.maxima().unwrap_or(maxima.len());
-    let mut heights: Vec<f64> = maxima.iter().take(in_cycle).map(|m| m.1).collect();
-    heights.sort_by(|a, b| b.total_cmp(a));
-    Ok(Attractor {
-        kind: kind(period, exponent, with_exponent, &maxima),
-        residual,
-        cycle_s,
-        exponent_per_s: exponent.map(|e| e.per_s),
-        exponent_threshold_per_s: exponent.map(|e| e.threshold_per_s()),
-        maxima_rad_per_s: heights,
-        lower: lower.into(),
-        upper: upper.into(),
-        end: motion.state().x.into(),
-        diverges_at_s: None,
-    })
+    let one = std::slice::from_ref(scenario);
+    let mut found = attractors(one, timing, with_exponent, Watch::NOBODY)?;
+    Ok(found.pop().flatten().expect("nobody stops it"))
 }
 
 /// Maxima and exponent must agree.
@@ -241,25 +252,4 @@ fn bands(maxima: &[(f64, f64)]) -> usize {
     };
     let most = MAX_BANDS.min(maxima.len() / MAXIMA_PER_BAND);
     (2..=most).rev().find(|&n| apart(n)).unwrap_or(1)
-}
-
-fn exponent(
-    scenario: &Scenario<f64>,
-    initial: State<f64>,
-    step_s: f64,
-    states: Vec<State<f64>>,
-) -> Option<Exponent> {
-    let mut scenario = started_at(scenario, &initial);
-    // As in the motion: the mean of the dither, and from the start.
-    scenario.dither.application = shared_model::dither::Application::Averaged;
-    scenario.dither.start_time_s = 0.0;
-    let trace = Trace {
-        step_s,
-        initial,
-        states,
-        duties: Vec::new(),
-        samples_per_step: scenario.samples_per_step() as usize,
-        pwm_period: 0,
-    };
-    largest(&scenario, &trace, 0)
 }

@@ -1,6 +1,6 @@
 //! Basins of attraction: which start ends on which attractor.
 
-use crate::chaos::attractor::{Attractor, Kind, attractor};
+use crate::chaos::attractor::{Attractor, Kind, attractors};
 use crate::chaos::equilibria;
 use crate::chaos::sweep::{SweepError, Timing, Values, Watch};
 use shared_model::Scenario;
@@ -51,13 +51,12 @@ pub fn basin(
         .iter()
         .flat_map(row)
         .collect::<Result<Vec<_>, _>>()?;
-    let ends = watch.points(&starts, |start| attractor(start, timing, false));
+    let ends = attractors(&starts, timing, false, watch)?;
     let equilibria = equilibria::find(scenario)?;
     let mut found: Vec<(usize, Attractor)> = Vec::new();
     let mut cells = Vec::new();
     for (k, (start, end)) in starts.iter().zip(ends).enumerate() {
         let Some(end) = end else { continue };
-        let end = end?;
         let known = found.iter().position(|(_, a)| a.is_same(&end, &equilibria));
         let attractor = known.unwrap_or(found.len());
         if known.is_none() {
@@ -69,10 +68,15 @@ pub fn basin(
             attractor,
         });
     }
-    let named = |(k, end): (usize, Attractor)| match end.kind {
-        Kind::Undecided => attractor(&starts[k], timing, true),
-        _ => Ok(end),
+    let unnamed = |(_, end): &&(usize, Attractor)| end.kind == Kind::Undecided;
+    let unnamed: Vec<_> = found.iter().filter(unnamed).map(|f| starts[f.0]).collect();
+    let mut named = attractors(&unnamed, timing, true, Watch::NOBODY)?
+        .into_iter()
+        .flatten();
+    let name = |(_, end): (usize, Attractor)| match end.kind {
+        Kind::Undecided => named.next().expect("nobody stops it"),
+        _ => end,
     };
-    let attractors = found.into_iter().map(named).collect::<Result<_, _>>()?;
+    let attractors = found.into_iter().map(name).collect();
     Ok(Basin { attractors, cells })
 }

@@ -1,6 +1,6 @@
-//! Maxima of the yaw rate found while the motion runs, so that long runs need no room for their states.
+//! Maxima of a sampled quantity found while the motion runs, so that long runs need no room for their states.
 
-use crate::chaos::period::{AT_REST_RAD_PER_S, PROMINENCE, prominent_maxima};
+use crate::chaos::period::{AT_REST_RAD_PER_S, maxima_of_turns};
 
 /// Collects the turning points of a quantity from its samples: two a cycle, whatever the step.
 ///
@@ -76,12 +76,15 @@ impl Extrema {
         self.high - self.low
     }
 
+    /// Time (s) and height of each turning point so far.
+    pub fn turns(&self) -> &[(f64, f64)] {
+        &self.turns
+    }
+
     /// Time (s) and height of the maxima that stand out by a hundredth of the range.
     pub fn maxima(&self) -> Vec<(f64, f64)> {
         let end = (self.extreme.time_s, self.extreme.value);
         let turns: Vec<_> = self.turns.iter().copied().chain([end]).collect();
-        let heights: Vec<f64> = turns.iter().map(|&(_, height)| height).collect();
-        let peaks = prominent_maxima(&heights, PROMINENCE * self.range());
-        peaks.into_iter().map(|k| turns[k]).collect()
+        maxima_of_turns(&turns, self.range())
     }
 }

@@ -3,11 +3,13 @@
 //! A tangent vector is carried along a motion by the linearised step (dual numbers through the integrator itself, so with
 //! the right jumps at friction events; stick takes one dimension away), and the mean rate of its growth is the largest
 //! exponent. [`largest`] takes any recorded motion: the firmware's own telemetry will do. [`exponents`] runs freely along a
-//! [`Flow`] with as many vectors as exponents are wanted, kept at right angles.
+//! [`Flow`] with as many vectors as exponents are wanted, kept at right angles. The engine's motions have tangent vectors of
+//! their own; their growths become exponents here too.
 
 use crate::chaos::flow::{Flow, Unmeasured, check, steps};
 use crate::chaos::period::yaw_rate_maxima;
 use crate::engine::dual::Dual;
+use crate::engine::taylor::Found;
 use crate::trace::Trace;
 use nalgebra::{SMatrix, SVector, Vector4};
 use shared_model::Scenario;
@@ -158,6 +160,35 @@ fn piece_ends(trace: &Trace, from: usize) -> Vec<usize> {
 /// K exponents of a free-running motion, in descending order. `None` stands for minus infinity.
 pub type Spectrum<const K: usize> = [Option<Exponent>; K];
 
+/// Growths of logarithms over successive pieces of equal time; minus infinity stands for a length that has become zero.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Pieces<const K: usize> {
+    /// Of `K` lengths in each piece.
+    pub growths: Vec<[f64; K]>,
+    /// Length of a piece, s.
+    pub length_s: f64,
+}
+
+impl<const K: usize> Pieces<K> {
+    /// Of a motion that the engine has followed for `time_s`.
+    pub fn of(found: &Found<K>, time_s: f64) -> Self {
+        Self {
+            growths: found.growths.clone(),
+            length_s: (1.0 - WARM_UP) * time_s / PIECES as f64,
+        }
+    }
+
+    /// The exponents.
+    pub fn spectrum(&self) -> Spectrum<K> {
+        std::array::from_fn(|k| {
+            let piece = |growths: &[f64; K]| (growths[k], self.length_s);
+            let pieces: Vec<_> = self.growths.iter().map(piece).collect();
+            let finite = pieces.iter().all(|&(growth, _)| growth.is_finite());
+            finite.then(|| Exponent::from_pieces(&pieces))
+        })
+    }
+}
+
 /// The K largest Lyapunov exponents of the motion from `start` over `time_s`; K = 1 gives the largest, K = N the spectrum.
 ///
 /// K tangent vectors go along in dual numbers and are brought back to right angles and length one behind every step
@@ -176,6 +207,15 @@ pub fn exponents<const N: usize, const K: usize>(
     start: &SVector<f64, N>,
     time_s: f64,
 ) -> Result<Spectrum<K>, Unmeasured> {
+    Ok(growths(flow, start, time_s)?.spectrum())
+}
+
+/// What [`exponents`] are taken from.
+pub(crate) fn growths<const N: usize, const K: usize>(
+    flow: &impl Flow<N>,
+    start: &SVector<f64, N>,
+    time_s: f64,
+) -> Result<Pieces<K>, Unmeasured> {
     let mut x = *start;
     // Linearly independent, and none along an axis, which may be invariant.
     let mut frame = SMatrix::<f64, N, K>::from_element(0.5) + SMatrix::<f64, N, K>::identity();
@@ -226,13 +266,12 @@ fn orthonormalise<const N: usize, const K: usize>(frame: &mut SMatrix<f64, N, K>
     })
 }
 
-/// K exponents from the growth of logarithms over successive pieces of equal time. `growth` goes on by the given number of
-/// steps; minus infinity stands for a length that has become zero.
+/// The growths of K logarithms behind the warm-up. `growth` goes on by the given number of steps.
 pub(crate) fn over_pieces<const N: usize, const K: usize>(
     flow: &impl Flow<N>,
     time_s: f64,
     mut growth: impl FnMut(usize) -> Result<[f64; K], Unmeasured>,
-) -> Result<Spectrum<K>, Unmeasured> {
+) -> Result<Pieces<K>, Unmeasured> {
     let steps = steps(flow, time_s);
     let warm_up = (steps as f64 * WARM_UP).ceil() as usize;
     let piece = (steps - warm_up.min(steps)) / PIECES;
@@ -241,15 +280,11 @@ pub(crate) fn over_pieces<const N: usize, const K: usize>(
         return Err(Unmeasured::TooShort { time_s, least_s });
     }
     growth(warm_up)?;
-    let length_s = piece as f64 * flow.step_s();
-    let mut pieces = [const { Vec::new() }; K];
-    for _ in 0..PIECES {
-        for (pieces, growth) in pieces.iter_mut().zip(growth(piece)?) {
-            pieces.push((growth, length_s));
-        }
-    }
-    Ok(pieces.map(|pieces| {
-        let finite = pieces.iter().all(|&(growth, _)| growth.is_finite());
-        finite.then(|| Exponent::from_pieces(&pieces))
-    }))
+    let growths = (0..PIECES)
+        .map(|_| growth(piece))
+        .collect::<Result<_, _>>()?;
+    Ok(Pieces {
+        growths,
+        length_s: piece as f64 * flow.step_s(),
+    })
 }

@@ -1,19 +1,22 @@
 //! The methods for Lyapunov exponents by their names, and what each finds of a vehicle's motion.
 
 use crate::chaos::flow::{Unmeasured, VehicleFlow, settle};
-use crate::chaos::lyapunov::{Exponent, exponents};
-use crate::chaos::sweep::Timing;
+use crate::chaos::lyapunov::{Exponent, Pieces};
+use crate::chaos::observe::observe;
+use crate::chaos::sweep::{Timing, Watch};
 use crate::chaos::synchronisation::{self, NoThreshold, Search};
 use crate::chaos::twin;
+use crate::engine::taylor::Watched;
+use crate::motion::Diverged;
 use shared_model::{InvalidScenario, Scenario};
 
 /// How an exponent is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// The largest one by tangent dynamics: [`exponents`] with one vector.
+    /// The largest one by tangent dynamics: the engine with one tangent vector.
     Tangent,
-    /// All four by tangent dynamics: [`exponents`] with four vectors.
+    /// All four by tangent dynamics: the engine with four tangent vectors.
     Spectrum,
     /// The largest one by two neighbouring motions: [`twin::largest`].
     Twin,
@@ -40,15 +43,17 @@ impl Method {
         matches!(self, Self::Synchronisation | Self::PrintedResponse)
     }
 
-    /// What the method costs, in steps of the model for each step of the motion; rounded measurements.
-    pub fn steps_per_step(self, search: Search) -> f64 {
-        match self {
-            Self::Tangent | Self::Twin => 2.0,
-            Self::Spectrum => 3.0,
+    /// What a motion costs by the method, in seconds of motion at the ECU's fixed step; rounded measurements.
+    pub fn cost_s(self, timing: Timing, search: Search) -> f64 {
+        let (transient, observed) = match self {
+            Self::Tangent => (0.012, 0.026),
+            Self::Spectrum => (0.012, 0.057),
+            Self::Twin => (1.0, 2.0),
             Self::Synchronisation | Self::PrintedResponse => {
-                1.0 + f64::from(search.couplings_tried())
+                (1.0, 1.0 + f64::from(search.couplings_tried()))
             }
-        }
+        };
+        transient * timing.transient_s + observed * timing.observed_s
     }
 }
 
@@ -151,22 +156,81 @@ impl Estimate {
     }
 }
 
-/// The exponents of the scenario's motion behind its transient: one estimate, or four of the spectrum.
+/// The exponents of each scenario's motion behind its transient: one estimate, or four of the spectrum. Results are in the
+/// scenarios' order; motions that were not begun have none.
 ///
 /// A motion that diverges, or a search that finds nothing, is an estimate that says so.
 ///
 /// # Errors
-/// If the scenario is not valid.
-pub fn estimate(
-    scenario: &Scenario<f64>,
+/// If a scenario is not valid.
+pub fn estimates(
+    scenarios: &[Scenario<f64>],
     method: Method,
     timing: Timing,
     search: Search,
-) -> Result<Vec<Estimate>, InvalidScenario> {
-    let flow = VehicleFlow::new(scenario)?;
+    watch: Watch,
+) -> Result<Vec<Option<Vec<Estimate>>>, InvalidScenario> {
+    match method {
+        Method::Tangent => by_engine::<1>(scenarios, method, timing, watch),
+        Method::Spectrum => by_engine::<4>(scenarios, method, timing, watch),
+        Method::Twin | Method::Synchronisation | Method::PrintedResponse => {
+            let one = |scenario: &Scenario<f64>| {
+                let flow = VehicleFlow::new(scenario)?;
+                let largest = by_flow(&flow, method, timing, search).map(|largest| vec![largest]);
+                let tolerance_per_s = method.searches().then_some(search.tolerance_per_s);
+                Ok(in_words(scenario, method, tolerance_per_s, largest))
+            };
+            let made = watch.points(scenarios, one);
+            made.into_iter().map(Option::transpose).collect()
+        }
+    }
+}
+
+/// By the engine's tangent vectors.
+fn by_engine<const K: usize>(
+    scenarios: &[Scenario<f64>],
+    method: Method,
+    timing: Timing,
+    watch: Watch,
+) -> Result<Vec<Option<Vec<Estimate>>>, InvalidScenario> {
+    let watched = Watched::default();
+    observe(scenarios, timing, watched, watch, |scenario, found| {
+        let pieces = Pieces::<K>::of(found, timing.observed_s);
+        let exponents = match found.diverged {
+            Some(Diverged { time_s }) => Err(Unmeasured::Diverges { time_s }.into()),
+            None => Ok(pieces.spectrum().to_vec()),
+        };
+        in_words(scenario, method, None, exponents)
+    })
+}
+
+/// The largest exponent by a method that steps a flow; `None` is minus infinity.
+fn by_flow(
+    flow: &VehicleFlow,
+    method: Method,
+    timing: Timing,
+    search: Search,
+) -> Result<Option<Exponent>, NoThreshold> {
+    let x = settle(flow, &flow.start(), timing.transient_s)?;
+    let time_s = timing.observed_s;
+    Ok(match method {
+        Method::Twin => twin::largest(flow, &x, time_s)?,
+        Method::PrintedResponse => {
+            Some(synchronisation::literal(flow, &x, time_s, search)?.exponent)
+        }
+        _ => Some(synchronisation::largest(flow, &x, time_s, search)?.exponent),
+    })
+}
+
+/// Estimates of exponents in descending order, of which `None` is minus infinity.
+fn in_words(
+    scenario: &Scenario<f64>,
+    method: Method,
+    tolerance_per_s: Option<f64>,
+    exponents: Result<Vec<Option<Exponent>>, NoThreshold>,
+) -> Vec<Estimate> {
     let without = |index, finding| Estimate::without(scenario, method, index, finding);
-    let tolerance_per_s = method.searches().then_some(search.tolerance_per_s);
-    Ok(match measure(&flow, method, timing, search) {
+    match exponents {
         Ok(exponents) => {
             let one = |(exponent, index): (Option<Exponent>, usize)| {
                 let estimate = without(index, Finding::MinusInfinity);
@@ -187,30 +251,5 @@ pub fn estimate(
                 ..without(1, finding)
             }]
         }
-    })
-}
-
-/// The exponents in descending order; `None` is minus infinity.
-fn measure(
-    flow: &VehicleFlow,
-    method: Method,
-    timing: Timing,
-    search: Search,
-) -> Result<Vec<Option<Exponent>>, NoThreshold> {
-    let x = settle(flow, &flow.start(), timing.transient_s)?;
-    let time_s = timing.observed_s;
-    let exponents = match method {
-        Method::Tangent => exponents::<4, 1>(flow, &x, time_s).map(|all| all.to_vec())?,
-        Method::Spectrum => exponents::<4, 4>(flow, &x, time_s).map(|all| all.to_vec())?,
-        Method::Twin => vec![twin::largest(flow, &x, time_s)?],
-        Method::Synchronisation => {
-            let threshold = synchronisation::largest(flow, &x, time_s, search)?;
-            vec![Some(threshold.exponent)]
-        }
-        Method::PrintedResponse => {
-            let threshold = synchronisation::literal(flow, &x, time_s, search)?;
-            vec![Some(threshold.exponent)]
-        }
-    };
-    Ok(exponents)
+    }
 }

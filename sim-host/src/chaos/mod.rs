@@ -3,6 +3,7 @@
 //!
 //! | question | module |
 //! |---|---|
+//! | what do motions do behind their transients? | [`observe`], [`fixed_step`] |
 //! | what is a motion to the methods? | [`flow`] |
 //! | exponents by tangent dynamics, the largest one or all | [`lyapunov`] |
 //! | the largest exponent by two neighbouring motions | [`twin`] |
@@ -18,9 +19,11 @@ pub mod attractor;
 pub mod basin;
 pub mod equilibria;
 pub mod extrema;
+pub mod fixed_step;
 pub mod flow;
 pub mod lyapunov;
 pub mod method;
+pub mod observe;
 pub mod orbit;
 pub mod period;
 pub mod poincare;

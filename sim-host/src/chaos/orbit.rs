@@ -1,12 +1,14 @@
 //! Orbit diagram (bifurcation diagram): where the motion's orbit meets a section, over a parameter.
 
-use crate::chaos::extrema::Extrema;
-use crate::chaos::period::AT_REST_RAD_PER_S;
+use crate::chaos::observe::observe;
+use crate::chaos::period::{AT_REST_RAD_PER_S, maxima_of_turns};
 use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, scenarios};
 use crate::component::Component;
-use crate::motion::Motion;
-use shared_model::Scenario;
+use crate::engine::taylor::{Found, Watched};
+use crate::motion::Diverged;
+use crate::simulate::started_at;
 use shared_model::vehicle::{State, YAW_RATE};
+use shared_model::{InvalidScenario, Scenario};
 
 /// Where the orbit is looked at.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -15,7 +17,7 @@ pub enum Section {
     /// At the local maxima of the yaw rate, as in the paper's diagrams; their heights are shown.
     YawRateMaxima,
     /// Where a component rises through a level; the yaw rate is shown, or the sideslip angle where the component is the yaw
-    /// rate. The crossing is interpolated linearly over the step, an error of second order.
+    /// rate.
     Rising {
         /// The component.
         component: Component,
@@ -34,6 +36,26 @@ impl Section {
             } => Component::SIDESLIP,
             _ => Component::YAW_RATE,
         }
+    }
+
+    /// The component whose maxima or crossings are looked at.
+    fn component(self) -> Component {
+        match self {
+            Self::YawRateMaxima => Component::YAW_RATE,
+            Self::Rising { component, .. } => component,
+        }
+    }
+
+    /// What the engine has to look at: rest shows in the yaw rate.
+    fn watched(self) -> Watched {
+        let mut turns = [false; 4];
+        turns[YAW_RATE] = true;
+        turns[self.component().index] = true;
+        let section = match self {
+            Self::YawRateMaxima => None,
+            Self::Rising { component, level } => Some((component.index, level)),
+        };
+        Watched { turns, section }
     }
 }
 
@@ -103,24 +125,19 @@ pub fn diagram(
     watch: Watch,
 ) -> Result<Vec<Point>, SweepError> {
     let scenarios = scenarios(scenario, parameter, values)?;
-    let make = |scenario: &Scenario<f64>, from| {
-        let (orbit, extent, end) = orbit(scenario, section, timing, from)?;
-        let value = parameter.of(scenario);
-        let point = Point {
-            value,
-            orbit,
-            extent,
-        };
-        Ok((point, end))
+    let follow = |scenarios: &[Scenario<f64>]| {
+        let watched = section.watched();
+        observe(scenarios, timing, watched, watch, |scenario, found| {
+            (point(parameter.of(scenario), section, found), found.end)
+        })
     };
-    let mut points = match start {
-        Start::Fixed => watch
-            .points(&scenarios, |scenario| Ok(make(scenario, None)?.0))
-            .into_iter()
-            .flatten()
-            .collect::<Result<Vec<_>, SweepError>>()?,
-        Start::Up => continued(scenarios.iter(), make, watch)?,
-        Start::Down => continued(scenarios.iter().rev(), make, watch)?,
+    let mut points: Vec<Point> = match start {
+        Start::Fixed => {
+            let made = follow(&scenarios)?.into_iter().flatten();
+            made.map(|(point, _)| point).collect()
+        }
+        Start::Up => continued(scenarios.iter(), follow)?,
+        Start::Down => continued(scenarios.iter().rev(), follow)?,
     };
     if start == Start::Down {
         points.reverse();
@@ -131,17 +148,17 @@ pub fn diagram(
 
 fn continued<'a>(
     scenarios: impl Iterator<Item = &'a Scenario<f64>>,
-    make: impl Fn(&Scenario<f64>, Option<State<f64>>) -> Result<(Point, Option<State<f64>>), SweepError>,
-    watch: Watch,
+    follow: impl Fn(&[Scenario<f64>]) -> Result<Vec<Option<(Point, State<f64>)>>, InvalidScenario>,
 ) -> Result<Vec<Point>, SweepError> {
     let mut end = None;
     let mut points = Vec::new();
     for scenario in scenarios {
-        let Some(made) = watch.point(|| make(scenario, end)) else {
+        let scenario = end.map_or(*scenario, |end| started_at(scenario, &end));
+        let Some((point, state)) = follow(&[scenario])?.pop().flatten() else {
             break;
         };
-        let (point, next) = made?;
-        end = next;
+        let diverges = matches!(point.orbit, Outcome::Diverges { .. });
+        end = (!diverges).then_some(state);
         points.push(point);
     }
     Ok(points)
@@ -167,61 +184,40 @@ fn check_crossed(section: Section, points: &[Point]) -> Result<(), SweepError> {
     })
 }
 
-/// One point: what it shows, the extent of the section's component, and where it ends unless it diverges.
-type Made = (Outcome, (f64, f64), Option<State<f64>>);
-
-fn orbit(
-    scenario: &Scenario<f64>,
-    section: Section,
-    timing: Timing,
-    from: Option<State<f64>>,
-) -> Result<Made, SweepError> {
-    let mut motion = Motion::new(scenario)?;
-    if let Some(from) = from {
-        motion.set_state(from);
+/// What a motion shows.
+fn point(value: f64, section: Section, found: &Found<0>) -> Point {
+    if let Some(Diverged { time_s }) = found.diverged {
+        return Point {
+            value,
+            orbit: Outcome::Diverges { time_s },
+            extent: (0.0, 0.0),
+        };
     }
-    let diverges = |time_s| (Outcome::Diverges { time_s }, (0.0, 0.0), None);
-    if let Err(diverged) = motion.observe(timing.transient_s, |_, _| {}) {
-        return Ok(diverges(diverged.time_s));
-    }
-    let component = match section {
-        Section::YawRateMaxima => Component::YAW_RATE,
-        Section::Rising { component, .. } => component,
-    };
-    let step_s = motion.step_s();
+    let range = found.upper[YAW_RATE] - found.lower[YAW_RATE];
     let shown = section.shown().index;
-    let mut extrema = Extrema::default();
-    let mut values = Vec::new();
-    let mut previous = motion.state().x;
-    let mut extent = (f64::INFINITY, f64::NEG_INFINITY);
-    let seen = motion.observe(timing.observed_s, |time_s, state| {
-        let now = state.x[component.index];
-        extent = (extent.0.min(now), extent.1.max(now));
-        extrema.push(time_s, step_s, state.x[YAW_RATE]);
-        if let Section::Rising { level, .. } = section {
-            let before = previous[component.index];
-            if before < level && now >= level {
-                let share = (level - before) / (now - before);
-                values.push(previous[shown] + share * (state.x[shown] - previous[shown]));
-            }
-            previous = state.x;
+    let values: Vec<f64> = match section {
+        Section::YawRateMaxima => maxima_of_turns(&found.turns[YAW_RATE], range)
+            .into_iter()
+            .map(|(_, height)| height)
+            .collect(),
+        Section::Rising { .. } => {
+            let rising = found.crossings.iter().filter(|crossing| crossing.rising);
+            rising.map(|crossing| crossing.x[shown]).collect()
         }
-    });
-    if let Err(diverged) = seen {
-        return Ok(diverges(timing.transient_s + diverged.time_s));
-    }
-    if section == Section::YawRateMaxima {
-        values = extrema.maxima().into_iter().map(|(_, h)| h).collect();
-    }
-    let end = *motion.state();
-    let outcome = if extrema.range() < AT_REST_RAD_PER_S {
+    };
+    let orbit = if range < AT_REST_RAD_PER_S {
         Outcome::Rests {
-            value: end.x[shown],
+            value: found.end.x[shown],
         }
     } else if values.is_empty() {
         Outcome::Misses
     } else {
         Outcome::Meets { values }
     };
-    Ok((outcome, extent, Some(end)))
+    let component = section.component().index;
+    Point {
+        value,
+        orbit,
+        extent: (found.lower[component], found.upper[component]),
+    }
 }

@@ -115,6 +115,13 @@ pub(crate) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
     maxima
 }
 
+/// Time (s) and height of the maxima among a quantity's turning points that stand out by a hundredth of its range.
+pub fn maxima_of_turns(turns: &[(f64, f64)], range: f64) -> Vec<(f64, f64)> {
+    let heights: Vec<f64> = turns.iter().map(|&(_, height)| height).collect();
+    let maxima = prominent_maxima(&heights, PROMINENCE * range);
+    maxima.into_iter().map(|k| turns[k]).collect()
+}
+
 /// Period of the motion from state index `from` on; maxima count as equal within `tolerance` of the yaw rate's range.
 pub fn period(trace: &Trace, from: usize, tolerance: f64) -> Period {
     let (low, high) = trace.range(YAW_RATE, from);

@@ -1,17 +1,21 @@
 //! Poincaré section: the states at which a motion crosses a hyperplane, one component at a given value.
 //!
-//! A crossing is located within its step by the cubic Hermite polynomial through the states and the right-hand sides at both
-//! ends: error of fourth order in the step where the motion is smooth, as the integrator's own (J. R. Dormand, P. J. Prince,
-//! Comput. Math. Appl. 12A (1986) 1007). In a step in which the friction mode changes it is of second order, as the
-//! integrator's too. M. Hénon's alternative (Physica D 5 (1982) 412), the component as independent variable, cannot cross
-//! the section of a steering rate that sticks at zero.
+//! Under the mean of the dither a crossing is a root of the engine's polynomial. Under the true signal it is located within the
+//! ECU's step by the cubic Hermite polynomial through the states and the right-hand sides at both ends: error of fourth order
+//! in the step where the motion is smooth, as the integrator's own (J. R. Dormand, P. J. Prince, Comput. Math. Appl. 12A (1986)
+//! 1007). In a step in which the friction mode changes it is of second order, as the integrator's too. M. Hénon's alternative
+//! (Physica D 5 (1982) 412), the component as independent variable, cannot cross the section of a steering rate that sticks at
+//! zero.
 
+use crate::chaos::observe::observe;
+use crate::chaos::sweep::{Timing, Watch};
 use crate::component::Component;
+use crate::engine::taylor::{Found, Watched};
 use crate::simulate;
 use crate::trace::is_bounded;
 use nalgebra::Vector4;
 use serde::Serialize;
-use shared_model::dither::Injection;
+use shared_model::dither::{Application, Injection};
 use shared_model::vehicle::{Model, State};
 use shared_model::{InvalidScenario, Scenario};
 use std::fmt;
@@ -26,6 +30,17 @@ pub enum Direction {
     Falling,
     /// Either.
     Both,
+}
+
+impl Direction {
+    /// Whether it is that of a crossing upwards, or of one downwards.
+    fn has(self, rising: bool) -> bool {
+        match self {
+            Self::Rising => rising,
+            Self::Falling => !rising,
+            Self::Both => true,
+        }
+    }
 }
 
 /// A section: a component at a value, passed in a direction.
@@ -115,17 +130,11 @@ pub fn crossings(
     transient_s: f64,
     section: &Section,
 ) -> Result<Vec<Crossing>, SectionError> {
-    let model = Model::new(scenario);
-    let index = section.component.index;
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    let mut crossings = Vec::new();
-    for_each_step(scenario, transient_s, |time_s, step| {
-        crossings.extend(step.crossing(&model, section).map(|crossing| Crossing {
-            time_s: time_s + crossing.time_s,
-            ..crossing
-        }));
-        (low, high) = (low.min(step.end.x[index]), high.max(step.end.x[index]));
-    })?;
+    let Passage {
+        crossings,
+        lowest: low,
+        highest: high,
+    } = passage(scenario, transient_s, section)?;
     if crossings.is_empty() {
         return Err(SectionError::NeverCrossed {
             section: Box::new(*section),
@@ -146,12 +155,97 @@ pub fn range(
     transient_s: f64,
     component: Component,
 ) -> Result<(f64, f64), SectionError> {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for_each_step(scenario, transient_s, |_, step| {
-        let value = step.end.x[component.index];
-        (low, high) = (low.min(value), high.max(value));
+    let section = Section {
+        component,
+        value: 0.0,
+        direction: Direction::Both,
+    };
+    let passage = passage(scenario, transient_s, &section)?;
+    Ok((passage.lowest, passage.highest))
+}
+
+/// How a motion passes a section.
+struct Passage {
+    crossings: Vec<Crossing>,
+    /// Extent of the section's component.
+    lowest: f64,
+    highest: f64,
+}
+
+fn passage(
+    scenario: &Scenario<f64>,
+    transient_s: f64,
+    section: &Section,
+) -> Result<Passage, SectionError> {
+    match scenario.dither.application {
+        Application::Signal => by_steps(scenario, transient_s, section),
+        Application::Averaged => by_engine(scenario, transient_s, section),
+    }
+}
+
+fn by_engine(
+    scenario: &Scenario<f64>,
+    transient_s: f64,
+    section: &Section,
+) -> Result<Passage, SectionError> {
+    let timing = Timing {
+        transient_s,
+        observed_s: scenario.run.duration_s,
+    };
+    let index = section.component.index;
+    let mut turns = [false; 4];
+    turns[index] = true;
+    let watched = Watched {
+        turns,
+        section: Some((index, section.value)),
+    };
+    let one = std::slice::from_ref(scenario);
+    let see = |_: &_, found: &Found<0>| found.clone();
+    let mut found = observe(one, timing, watched, Watch::NOBODY, see)?;
+    let found = found.pop().flatten().expect("nobody stops it");
+    if let Some(diverged) = found.diverged {
+        let time_s = (diverged.time_s - transient_s).max(0.0);
+        return Err(SectionError::Diverges { time_s });
+    }
+    let wanted = found
+        .crossings
+        .iter()
+        .filter(|c| section.direction.has(c.rising));
+    let crossings = wanted.map(|crossing| Crossing {
+        time_s: crossing.time_s,
+        x: crossing.x.into(),
+        rising: crossing.rising,
+    });
+    Ok(Passage {
+        crossings: crossings.collect(),
+        lowest: found.lower[index],
+        highest: found.upper[index],
+    })
+}
+
+fn by_steps(
+    scenario: &Scenario<f64>,
+    transient_s: f64,
+    section: &Section,
+) -> Result<Passage, SectionError> {
+    let model = Model::new(scenario);
+    let index = section.component.index;
+    let mut passage = Passage {
+        crossings: Vec::new(),
+        lowest: f64::INFINITY,
+        highest: f64::NEG_INFINITY,
+    };
+    for_each_step(scenario, transient_s, |time_s, step| {
+        let crossing = step.crossing(&model, section);
+        passage.crossings.extend(crossing.map(|crossing| Crossing {
+            time_s: time_s + crossing.time_s,
+            ..crossing
+        }));
+        let value = step.end.x[index];
+        passage.lowest = passage.lowest.min(value);
+        passage.highest = passage.highest.max(value);
     })?;
-    Ok((low, high))
+    Ok(passage)
 }
 
 /// Hands the steps behind the transient to `visit`, each with the time of its start (s). Nothing is kept, so that a run may be
@@ -211,12 +305,7 @@ impl Step {
         );
         let rising = before < 0.0 && after >= 0.0;
         let falling = before > 0.0 && after <= 0.0;
-        let crosses = match section.direction {
-            Direction::Rising => rising,
-            Direction::Falling => falling,
-            Direction::Both => rising || falling,
-        };
-        if !crosses {
+        if !(rising || falling) || !section.direction.has(rising) {
             return None;
         }
         let slope = |state: &State<f64>| {
@@ -284,8 +373,8 @@ mod tests {
     #[test]
     fn crossings_converge_in_fourth_order() {
         let rising = section("gamma", 0.0, Direction::Rising);
-        let first = |rate_hz| crossings(&smooth(rate_hz), 0.0, &rising).unwrap()[0];
-        let exact = first(10_000.0);
+        let first = |rate_hz| by_steps(&smooth(rate_hz), 0.0, &rising).unwrap().crossings[0];
+        let exact = crossings(&smooth(1000.0), 0.0, &rising).unwrap()[0];
         let error = |rate_hz| {
             let crossing = first(rate_hz);
             let off = crossing.x - exact.x;

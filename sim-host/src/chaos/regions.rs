@@ -1,9 +1,8 @@
 //! Regions of a parameter in which the motion is of one kind, and their edges.
 
-use crate::chaos::attractor::{Attractor, Kind, attractor};
+use crate::chaos::attractor::{Attractor, Kind, attractors};
 use crate::chaos::equilibria;
 use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, scenarios};
-use rayon::prelude::*;
 use shared_model::Scenario;
 
 /// The motion at one value of the parameter.
@@ -72,9 +71,9 @@ pub struct Regions {
 /// Classifies the motion from the scenario's start at each of the values, and bisects between neighbours of unlike kind
 /// until the edge is in an interval no wider than `width`.
 ///
-/// Where the kind in the middle is neither of the two, both halves have an edge, so cascades unfold. Windows narrower than
-/// the step of the sweep between values of the same kind are not seen. Time grows with the number of values, plus
-/// log2(step/width) for each edge, times the length of a run.
+/// All edges are halved side by side. Where the kind in the middle is neither of the two, both halves have an edge, so
+/// cascades unfold. Windows narrower than the step of the sweep between values of the same kind are not seen. Time grows with
+/// the number of values, plus log2(step/width) for each edge, times the length of a run.
 ///
 /// # Errors
 /// If a value's scenario is not valid.
@@ -86,57 +85,32 @@ pub fn regions(
     timing: Timing,
     watch: Watch,
 ) -> Result<Regions, SweepError> {
-    let scenarios = scenarios(scenario, parameter, values)?;
-    let sample = |scenario: &Scenario<f64>| {
-        let attractor = attractor(scenario, timing, true)?;
-        let value = parameter.of(scenario);
-        Ok(Sample { value, attractor })
-    };
-    let made = watch.points(&scenarios, sample);
-    let begun = made.iter().flatten().count();
-    let coarse = made
-        .into_iter()
-        .flatten()
-        .collect::<Result<Vec<Sample>, SweepError>>()?;
-    let between = |value: f64| watch.point(|| sample(&parameter.set(scenario, value)));
-    let between = |pair: &[Sample]| refine(&pair[0], &pair[1], width, &between);
-    let finer = coarse
-        .par_windows(2)
-        .with_max_len(1)
-        .map(between)
-        .collect::<Result<Vec<_>, SweepError>>()?;
-    let mut samples = coarse;
-    samples.extend(finer.into_iter().flatten());
-    samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let mut level = scenarios(scenario, parameter, values)?;
+    let mut samples: Vec<Sample> = Vec::new();
+    let mut complete = true;
+    while complete && !level.is_empty() {
+        let found = attractors(&level, timing, true, watch)?;
+        complete = found.iter().all(Option::is_some);
+        let sampled = level.iter().zip(found).filter_map(|(scenario, attractor)| {
+            let value = parameter.of(scenario);
+            attractor.map(|attractor| Sample { value, attractor })
+        });
+        samples.extend(sampled);
+        samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let wide = edges(&samples)
+            .into_iter()
+            .filter(|edge| edge.upper - edge.lower > width);
+        level = wide
+            .map(|edge| parameter.set(scenario, edge.middle()))
+            .collect();
+    }
     let edges = edges(&samples);
-    let complete = begun == values.count() && edges.iter().all(|e| e.upper - e.lower <= width);
     Ok(Regions {
         regions: stretches(&samples, &edges),
         samples,
         edges,
         complete,
     })
-}
-
-/// The samples that a bisection between the two adds.
-fn refine(
-    lower: &Sample,
-    upper: &Sample,
-    width: f64,
-    sample: &impl Fn(f64) -> Option<Result<Sample, SweepError>>,
-) -> Result<Vec<Sample>, SweepError> {
-    let wide = upper.value - lower.value > width;
-    if !wide || lower.attractor.kind == upper.attractor.kind {
-        return Ok(Vec::new());
-    }
-    let Some(middle) = sample(0.5 * (lower.value + upper.value)) else {
-        return Ok(Vec::new());
-    };
-    let middle = middle?;
-    let mut samples = refine(lower, &middle, width, sample)?;
-    samples.extend(refine(&middle, upper, width, sample)?);
-    samples.push(middle);
-    Ok(samples)
 }
 
 fn edges(samples: &[Sample]) -> Vec<Edge> {

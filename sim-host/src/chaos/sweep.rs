@@ -9,6 +9,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Most values of one range.
 const MAX_VALUES: f64 = 1e7;
 
+/// Most items of a batch: the engine's lanes are full for most of its time, and a stop is heard soon.
+pub const LARGEST_BATCH: usize = 64;
+
 /// What a sweep varies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -246,7 +249,16 @@ pub struct Watch<'a> {
     pub done: &'a (dyn Fn() + Sync),
 }
 
+/// Never set.
+static NEVER: AtomicBool = AtomicBool::new(false);
+
 impl Watch<'_> {
+    /// Nobody looks on.
+    pub const NOBODY: Watch<'static> = Watch {
+        stop: &NEVER,
+        done: &|| (),
+    };
+
     /// The result of `work`, unless no point is to be begun any more.
     pub fn point<R>(&self, work: impl FnOnce() -> R) -> Option<R> {
         if self.stop.load(Ordering::Relaxed) {
@@ -266,5 +278,27 @@ impl Watch<'_> {
     ) -> Vec<Option<R>> {
         let one = |item| self.point(|| work(item));
         items.par_iter().with_max_len(1).map(one).collect()
+    }
+
+    /// The same for work that takes a batch of items and gives a result for each. Batches are of a size, and as many as keep
+    /// all threads busy.
+    pub fn batches<T: Sync, R: Send>(
+        &self,
+        items: &[T],
+        work: impl Fn(&[T]) -> Vec<R> + Sync,
+    ) -> Vec<Option<R>> {
+        let one = |batch: &[T]| -> Vec<Option<R>> {
+            if self.stop.load(Ordering::Relaxed) {
+                return batch.iter().map(|_| None).collect();
+            }
+            let results = work(batch);
+            results.iter().for_each(|_| (self.done)());
+            results.into_iter().map(Some).collect()
+        };
+        let threads = rayon::current_num_threads();
+        let rounds = items.len().div_ceil(LARGEST_BATCH * threads);
+        let length = items.len().div_ceil((rounds * threads).max(1)).max(1);
+        let batches = items.par_chunks(length).with_max_len(1);
+        batches.flat_map_iter(one).collect()
     }
 }

@@ -28,7 +28,7 @@ pub fn largest<const N: usize>(
     let mut x = *start;
     let mut twin = x.add_scalar(DISTANCE / (N as f64).sqrt());
     let mut done = 0;
-    let [exponent] = over_pieces(flow, time_s, |steps| {
+    let pieces = over_pieces(flow, time_s, |steps| {
         let mut growth = 0.0;
         let mut left = steps;
         while left > 0 {
@@ -49,5 +49,6 @@ pub fn largest<const N: usize>(
         }
         Ok([growth])
     })?;
+    let [exponent] = pieces.spectrum();
     Ok(exponent)
 }

@@ -1,7 +1,7 @@
 //! `sim-host basin`: which start ends on which attractor.
 
 use super::output::Destinations;
-use super::sweep::{TransientOptions, check_interrupted, large_dots, threads, with_progress};
+use super::sweep::{TransientOptions, check_interrupted, large_dots, side_by_side, with_progress};
 use super::{Done, RunOptions};
 use serde::Serialize;
 use sim_host::chaos::attractor::{Attractor, Kind};
@@ -93,7 +93,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments.destinations.check_free()?;
     let runs = betas.count().saturating_mul(deltas.count());
     let announced = &arguments.transient;
-    announced.announce(runs, timing, &scenario, threads())?;
+    announced.announce(runs, timing, &scenario, side_by_side())?;
     let basin = with_progress(runs, |watch| {
         basin(&scenario, &betas, &deltas, timing, watch)
     })?;

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use shared_model::Scenario;
 use sim_host::chaos::flow::{Flow, VehicleFlow};
-use sim_host::chaos::method::{Estimate, Method, estimate};
+use sim_host::chaos::method::{Estimate, Method, estimates};
 use sim_host::chaos::sweep::{Parameter, Timing, Values, Watch, scenarios};
 use sim_host::chaos::synchronisation::Search;
 use sim_host::pil::qemu::INTERRUPTED;
@@ -116,27 +116,24 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     .validated()?;
     arguments.destinations.check_free()?;
     let methods = methods(arguments);
-    let points: Vec<(Scenario<f64>, Method)> = scenarios
-        .iter()
-        .flat_map(|&scenario| methods.iter().map(move |&method| (scenario, method)))
-        .collect();
+    let points = scenarios.len() * methods.len();
     announce(&scenarios, &methods, timing, search)?;
-    let (estimates, done) = measure(&points, timing, search)?;
+    let (estimates, done) = measure(&scenarios, &methods, timing, search)?;
     show(&estimates);
     let results = Results {
         transient_s: timing.transient_s,
         observed_s: timing.observed_s,
         search,
-        complete: done == points.len(),
+        complete: done == points,
         exponents: &estimates,
     };
     arguments.destinations.write(&estimates, &results, || {
         chart(&estimates, &methods, timing).svg()
     })?;
-    if done < points.len() {
+    if done < points {
         eprintln!(
             "stopped: {done} of {} points are done; their results are shown, and written where files were asked for",
-            points.len()
+            points
         );
         return Ok(Done::Code(COULD_NOT_RUN));
     }
@@ -199,12 +196,8 @@ fn announce(
         x = std::hint::black_box(flow.step(&x));
     }
     let step = start.elapsed().as_secs_f64() / f64::from(TRIAL_STEPS);
-    let measured = |method: &Method| timing.observed_s * method.steps_per_step(search);
-    let one_speed = methods
-        .iter()
-        .map(|method| timing.transient_s + measured(method))
-        .sum::<f64>()
-        / flow.step_s();
+    let cost_s = |method: &Method| method.cost_s(timing, search);
+    let one_speed = methods.iter().map(cost_s).sum::<f64>() / flow.step_s();
     let threads = rayon::current_num_threads() as f64;
     let seconds = one_speed * step * scenarios.len() as f64 / threads;
     if seconds > ANNOUNCED_S {
@@ -217,13 +210,14 @@ fn announce(
     Ok(())
 }
 
-/// The estimates in the points' order, and how many points are done.
+/// The estimates by speed and method, and how many points are done.
 fn measure(
-    points: &[(Scenario<f64>, Method)],
+    scenarios: &[Scenario<f64>],
+    methods: &[Method],
     timing: Timing,
     search: Search,
 ) -> anyhow::Result<(Vec<Estimate>, usize)> {
-    let bar = ProgressBar::new(points.len() as u64).with_style(
+    let bar = ProgressBar::new((scenarios.len() * methods.len()) as u64).with_style(
         ProgressStyle::with_template("{elapsed_precise} [{bar:40}] {pos}/{len} points, {eta} left")
             .expect("the template is valid")
             .progress_chars("=> "),
@@ -233,14 +227,15 @@ fn measure(
         stop: &INTERRUPTED,
         done: &|| bar.inc(1),
     };
-    let work =
-        |(scenario, method): &(Scenario<f64>, Method)| estimate(scenario, *method, timing, search);
-    let estimates: Vec<_> = watch.points(points, work).into_iter().flatten().collect();
+    let by_method = methods
+        .iter()
+        .map(|&method| estimates(scenarios, method, timing, search, watch))
+        .collect::<Result<Vec<_>, _>>()?;
     bar.finish_and_clear();
-    let done = estimates.len();
-    let estimates: Result<Vec<_>, _> = estimates.into_iter().collect();
-    let estimates = estimates?;
-    Ok((estimates.into_iter().flatten().collect(), done))
+    let of_speed = |k: usize| by_method.iter().filter_map(move |made| made[k].clone());
+    let points: Vec<Vec<Estimate>> = (0..scenarios.len()).flat_map(of_speed).collect();
+    let done = points.len();
+    Ok((points.into_iter().flatten().collect(), done))
 }
 
 fn show(estimates: &[Estimate]) {

@@ -2,7 +2,7 @@
 
 use super::output::Destinations;
 use super::sweep::{
-    RangeOptions, TransientOptions, check_interrupted, paper_regions, threads, with_progress,
+    RangeOptions, TransientOptions, check_interrupted, paper_regions, side_by_side, with_progress,
 };
 use super::{Done, RunOptions};
 use clap::ValueEnum;
@@ -122,14 +122,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         arguments.level
     );
     let section = arguments.section.section(arguments.level);
-    let (start, threads) = match arguments.start {
-        StartOption::Fixed => (Start::Fixed, threads()),
+    let (start, at_once) = match arguments.start {
+        StartOption::Fixed => (Start::Fixed, side_by_side()),
         StartOption::Up => (Start::Up, 1),
         StartOption::Down => (Start::Down, 1),
     };
     arguments.destinations.check_free()?;
     let announced = &arguments.transient;
-    announced.announce(values.count(), timing, &scenario, threads)?;
+    announced.announce(values.count(), timing, &scenario, at_once)?;
     let points = with_progress(values.count(), |watch| {
         diagram(&scenario, parameter, &values, section, timing, start, watch)
     })?;

@@ -2,7 +2,7 @@
 
 use super::output::Destinations;
 use super::sweep::{
-    RangeOptions, TransientOptions, check_interrupted, paper_regions, threads, with_progress,
+    RangeOptions, TransientOptions, check_interrupted, paper_regions, side_by_side, with_progress,
 };
 use super::{Done, RunOptions};
 use anyhow::ensure;
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments.destinations.check_free()?;
     let runs = 2 * values.count();
     let announced = &arguments.transient;
-    announced.announce(runs, timing, &scenario, threads())?;
+    announced.announce(runs, timing, &scenario, side_by_side())?;
     let starts = [("given", scenario), ("mirrored", mirrored(&scenario))];
     let sweeps = with_progress(runs, |watch| {
         let sweep = |(start, scenario)| {

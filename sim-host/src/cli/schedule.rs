@@ -151,7 +151,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     check_all_free(files, arguments.force)?;
     let mut analyses = Vec::new();
     for (scenario, plan) in plans {
-        let made = with_progress(runs(&plan) / 2, |watch| schedule(&scenario, &plan, watch))?;
+        let made = with_progress(runs(&plan), |watch| schedule(&scenario, &plan, watch))?;
         let Some(analysis) = made else {
             bail!("interrupted: a schedule needs all of its runs; no file was written");
         };

@@ -6,20 +6,21 @@ use clap::{Args, ValueEnum};
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use sim_host::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch};
-use sim_host::motion::Motion;
+use sim_host::chaos::observe::observe;
+use sim_host::chaos::sweep::{LARGEST_BATCH, Parameter, SweepError, Timing, Values, Watch};
+use sim_host::engine::taylor::Watched;
 use sim_host::paper::REGION_EDGES_RPM;
 use sim_host::pil::qemu::INTERRUPTED;
 use sim_host::report::chart::{Look, Region, Series};
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// More runs than this have their cost said first.
 const MANY: usize = 1000;
 /// More runs than this have to be confirmed.
 const TOO_MANY: usize = 20_000;
-/// Steps that are timed for the cost.
-const TIMED_STEPS: u32 = 20_000;
+/// Length of the runs that are timed for the cost, s.
+const TIMED_S: f64 = 10.0;
 
 /// What is swept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -95,27 +96,25 @@ impl TransientOptions {
         Timing::new(self.transient, time_s)
     }
 
-    /// Says what many runs cost, and refuses too many unless they are confirmed.
+    /// Says what many runs cost, of which so many go side by side, and refuses too many unless they are confirmed.
     pub fn announce(
         &self,
         runs: usize,
         timing: Timing,
         scenario: &Scenario<f64>,
-        threads: usize,
+        at_once: usize,
     ) -> anyhow::Result<()> {
         if runs <= MANY {
             return Ok(());
         }
-        let mut motion = Motion::new(scenario)?;
+        let trial = vec![*scenario; at_once];
         let start = Instant::now();
-        for _ in 0..TIMED_STEPS {
-            motion.step();
-        }
-        let step = start.elapsed().as_secs_f64() / f64::from(TIMED_STEPS);
-        let steps = runs as f64 * timing.time_s() / scenario.step_s();
-        let cost = HumanDuration(Duration::from_secs_f64(step * steps / threads as f64));
+        let timed = Timing::new(0.0, TIMED_S)?;
+        observe::<0, ()>(&trial, timed, Watched::default(), Watch::NOBODY, |_, _| ())?;
+        let rounds = runs.div_ceil(at_once) as f64 * timing.time_s() / TIMED_S;
+        let cost = HumanDuration(start.elapsed().mul_f64(rounds));
         let cost = format!(
-            "{runs} runs of {} s are {steps:.1e} model steps: at least {cost} on {threads} threads",
+            "{runs} runs of {} s each, {at_once} at once: about {cost}",
             timing.time_s()
         );
         ensure!(
@@ -127,9 +126,9 @@ impl TransientOptions {
     }
 }
 
-/// Threads for independent runs.
-pub fn threads() -> usize {
-    rayon::current_num_threads()
+/// Independent runs that go side by side on all threads.
+pub fn side_by_side() -> usize {
+    LARGEST_BATCH * rayon::current_num_threads()
 }
 
 /// Does the work with progress on a terminal, `runs` being expected.

@@ -3,8 +3,8 @@
 
 use super::piece::{Drawing, Material, Named, Table, csv_of};
 use super::{Made, Quality};
-use crate::chaos::attractor::{Attractor, attractor};
-use crate::chaos::method::{Estimate, Method, estimate};
+use crate::chaos::attractor::{Attractor, attractors};
+use crate::chaos::method::{Estimate, Method, estimates};
 use crate::chaos::poincare::{Direction, Section, SectionError, crossings};
 use crate::chaos::power_spectrum::welch;
 use crate::chaos::sweep::{SweepError, Timing, Watch};
@@ -41,25 +41,14 @@ pub fn exponents(named: &Named, quality: Quality, watch: Watch) -> Made {
         Method::PrintedResponse,
         Method::Spectrum,
     ];
-    let points: Vec<(f64, Method)> = SPEEDS_RPM
-        .into_iter()
-        .flat_map(|rpm| methods.map(|method| (rpm, method)))
-        .collect();
-    let made = watch.points(&points, |&(rpm, method)| {
-        estimate(
-            &at_speed(&named.scenario, rpm),
-            method,
-            timing,
-            Search::default(),
-        )
-    });
-    let estimates: Vec<Estimate> = made
-        .into_iter()
-        .flatten()
-        .collect::<Result<Vec<_>, _>>()?
-        .into_iter()
-        .flatten()
-        .collect();
+    let scenarios = SPEEDS_RPM.map(|rpm| at_speed(&named.scenario, rpm));
+    let mut all: Vec<Estimate> = Vec::new();
+    for method in methods {
+        let made = estimates(&scenarios, method, timing, Search::default(), watch)?;
+        all.extend(made.into_iter().flatten().flatten());
+    }
+    all.sort_by(|a, b| a.wheel_speed_rpm.total_cmp(&b.wheel_speed_rpm));
+    let estimates = all;
     let findings = SPEEDS_RPM.map(|rpm| {
         (
             format!("Exponents at {rpm} rpm, 1/s"),
@@ -279,41 +268,27 @@ pub fn lengths(named: &Named, quality: Quality, watch: Watch) -> Made {
     let by_run = runs_s
         .iter()
         .map(|&run_s| (transients_s[transients_s.len() - 1], run_s));
-    let points: Vec<(f64, f64, f64)> = by_transient
-        .chain(by_run)
-        .flat_map(|(transient_s, run_s)| {
-            [1600.0, 1750.0, 1845.0].map(|rpm| (transient_s, run_s, rpm))
-        })
-        .collect();
-    let made = watch.points(&points, |&(transient_s, run_s, rpm)| {
+    let speeds_rpm = [1600.0, 1750.0, 1845.0];
+    let scenarios = speeds_rpm.map(|rpm| at_speed(&named.scenario, rpm));
+    let finding = |(transient_s, run_s): (f64, f64)| {
         let timing = Timing::new(transient_s, transient_s + run_s)?;
-        Ok((
-            transient_s,
-            run_s,
-            rpm,
-            attractor(&at_speed(&named.scenario, rpm), timing, true)?,
-        ))
-    });
-    let made = made
-        .into_iter()
-        .flatten()
-        .collect::<Result<Vec<_>, SweepError>>()?;
-    let findings = made.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).map(|same| {
-        let one = |(_, _, rpm, found): &(f64, f64, f64, Attractor)| {
+        let made = attractors(&scenarios, timing, true, watch)?;
+        let word = |(rpm, found): (f64, Option<Attractor>)| {
+            let found = found?;
             let exponent = found
                 .exponent_per_s
                 .map_or_else(String::new, |exponent| format!(" ({exponent:.3} 1/s)"));
-            format!("{rpm} rpm {}{exponent}", found.kind)
+            Some(format!("{rpm} rpm {}{exponent}", found.kind))
         };
-        let words: Vec<String> = same.iter().map(one).collect();
-        let (transient_s, run_s) = (same[0].0, same[0].1);
-        (
+        let words: Vec<String> = speeds_rpm.into_iter().zip(made).filter_map(word).collect();
+        Ok((
             format!("{run_s} s behind {transient_s} s"),
             words.join(", "),
-        )
-    });
+        ))
+    };
+    let findings = by_transient.chain(by_run).map(finding);
     Ok(Material {
-        findings: findings.collect(),
+        findings: findings.collect::<Result<_, SweepError>>()?,
         ..Material::default()
     })
 }

@@ -1,10 +1,10 @@
 //! The schedule as the ECU uses it: looked up, and applied as the true signal at the PWM's rate.
 
 use super::choose::Entry;
-use super::map::{Cell, both, cell};
+use super::map::{Cell, cells};
 use crate::chaos::attractor::Kind;
 use crate::chaos::period::{Period, RIPPLE_TOLERANCE, period};
-use crate::chaos::sweep::{SweepError, Timing, Values, Watch};
+use crate::chaos::sweep::{SweepError, Timing, Values, Watch, mirrored};
 use crate::simulate::{after_transient, record, settle, started_at};
 use crate::trace::is_bounded;
 use shared_model::Scenario;
@@ -38,17 +38,32 @@ pub(super) fn check(
     let midway = speeds.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
     let mut at: Vec<f64> = midway.chain(speeds.iter().copied()).collect();
     at.sort_by(f64::total_cmp);
-    let checked = watch.points(&at, |&rpm| {
-        let mut scenario = *scenario;
-        scenario.run.wheel_speed_rpm = rpm;
-        scenario.dither.amplitude_v = amplitude_v(first_rpm, step_rpm, &amplitudes_v, rpm);
-        if scenario.dither.amplitude_v == 0.0 {
-            return cell(&scenario, timing);
-        }
-        both(&scenario, |scenario| under_signal(scenario, timing))
+    let at: Vec<Scenario<f64>> = at
+        .into_iter()
+        .map(|rpm| {
+            let mut scenario = *scenario;
+            scenario.run.wheel_speed_rpm = rpm;
+            scenario.dither.amplitude_v = amplitude_v(first_rpm, step_rpm, &amplitudes_v, rpm);
+            scenario
+        })
+        .collect();
+    let (undithered, dithered): (Vec<_>, Vec<_>) =
+        at.into_iter().partition(|s| s.dither.amplitude_v == 0.0);
+    let Some(mut checked) = cells(&undithered, timing, watch)? else {
+        return Ok(None);
+    };
+    let under_signal = watch.points(&dithered, |scenario| {
+        let given = under_signal(scenario, timing)?;
+        let mirrored = under_signal(&mirrored(scenario), timing)?;
+        Ok(Cell::of(scenario, given, mirrored))
     });
-    let checked = checked.into_iter().collect::<Option<Result<_, _>>>();
-    checked.transpose()
+    let under_signal: Option<Result<Vec<_>, SweepError>> = under_signal.into_iter().collect();
+    let Some(under_signal) = under_signal.transpose()? else {
+        return Ok(None);
+    };
+    checked.extend(under_signal);
+    checked.sort_by(|a, b| a.wheel_speed_rpm.total_cmp(&b.wheel_speed_rpm));
+    Ok(Some(checked))
 }
 
 /// Kind of the motion when the true signal sets in on the settled undithered motion.

@@ -1,9 +1,8 @@
 //! Kinds of motion over wheel speed N and dither amplitude W.
 
 use super::Plan;
-use crate::chaos::attractor::{Kind, attractor};
+use crate::chaos::attractor::{Attractor, Kind, attractors};
 use crate::chaos::sweep::{Parameter, SweepError, Timing, Watch, mirrored};
-use rayon::prelude::*;
 use shared_model::Scenario;
 
 /// The worse of the motions from both starts; from good to bad.
@@ -73,6 +72,16 @@ pub struct Cell {
 }
 
 impl Cell {
+    /// The scenario's cell.
+    pub(super) fn of(scenario: &Scenario<f64>, given: Kind, mirrored: Kind) -> Self {
+        Self {
+            wheel_speed_rpm: scenario.run.wheel_speed_rpm,
+            amplitude_v: scenario.dither.amplitude_v,
+            given,
+            mirrored,
+        }
+    }
+
     /// The worse of both.
     pub fn class(&self) -> Class {
         Class::of(self.given).max(Class::of(self.mirrored))
@@ -93,31 +102,33 @@ pub struct Column {
     pub cells: Vec<Cell>,
 }
 
-/// The motions of a scenario from both starts under the mean of its dither, which is on from the start.
+/// The motions of scenarios from both starts under the mean of their dither, which is on from the start; `None` if it was
+/// stopped.
 ///
 /// # Errors
-/// If the scenario is not valid.
-pub fn cell(scenario: &Scenario<f64>, timing: Timing) -> Result<Cell, SweepError> {
-    let kind = |scenario: &Scenario<f64>| Ok(attractor(scenario, timing, false)?.kind);
-    both(scenario, kind)
-}
-
-/// The scenario's cell, given how to tell a motion's kind.
-pub(super) fn both(
-    scenario: &Scenario<f64>,
-    kind: impl Fn(&Scenario<f64>) -> Result<Kind, SweepError>,
-) -> Result<Cell, SweepError> {
-    Ok(Cell {
-        wheel_speed_rpm: scenario.run.wheel_speed_rpm,
-        amplitude_v: scenario.dither.amplitude_v,
-        given: kind(scenario)?,
-        mirrored: kind(&mirrored(scenario))?,
-    })
+/// If a scenario is not valid.
+pub fn cells(
+    scenarios: &[Scenario<f64>],
+    timing: Timing,
+    watch: Watch,
+) -> Result<Option<Vec<Cell>>, SweepError> {
+    let starts = |scenario: &Scenario<f64>| [*scenario, mirrored(scenario)];
+    let starts: Vec<_> = scenarios.iter().flat_map(starts).collect();
+    let ends = attractors(&starts, timing, false, watch)?;
+    let Some(ends) = ends.into_iter().collect::<Option<Vec<_>>>() else {
+        return Ok(None);
+    };
+    let cell = |(scenario, ends): (&Scenario<f64>, &[Attractor])| {
+        Cell::of(scenario, ends[0].kind, ends[1].kind)
+    };
+    Ok(Some(
+        scenarios.iter().zip(ends.chunks(2)).map(cell).collect(),
+    ))
 }
 
 /// The column of each wheel speed of the plan; `None` if it was stopped.
 ///
-/// Edges are bisected between rest, period one and all else; those within all else are not.
+/// Edges are bisected between rest, period one and all else, all of them side by side; those within all else are not.
 pub(super) fn columns(
     scenario: &Scenario<f64>,
     plan: &Plan,
@@ -128,61 +139,38 @@ pub(super) fn columns(
         Parameter::Amplitude.set(&scenario, volts)
     };
     let of_speed = |rpm| plan.amplitudes_v.iter().map(move |volts| at(rpm, volts));
-    let scenarios: Vec<_> = plan.speeds_rpm.iter().flat_map(of_speed).collect();
-    let coarse = watch.points(&scenarios, |scenario| cell(scenario, plan.timing));
-    let Some(coarse) = coarse.into_iter().collect::<Option<Result<Vec<_>, _>>>() else {
-        return Ok(None);
+    let mut level: Vec<_> = plan.speeds_rpm.iter().flat_map(of_speed).collect();
+    let mut all: Vec<Cell> = Vec::new();
+    while !level.is_empty() {
+        let Some(made) = cells(&level, plan.timing, watch)? else {
+            return Ok(None);
+        };
+        all.extend(made);
+        let place = |cell: &Cell| (cell.wheel_speed_rpm, cell.amplitude_v);
+        all.sort_by(|a, b| {
+            let ((rpm, volts), (other_rpm, other_volts)) = (place(a), place(b));
+            rpm.total_cmp(&other_rpm)
+                .then(volts.total_cmp(&other_volts))
+        });
+        let middles = all.windows(2).filter_map(|pair| {
+            middle_v(&pair[0], &pair[1], plan.edge_width_v)
+                .map(|volts| at(pair[0].wheel_speed_rpm, volts))
+        });
+        level = middles.collect();
+    }
+    let columns = all.chunk_by(|a, b| a.wheel_speed_rpm == b.wheel_speed_rpm);
+    let column = |cells: &[Cell]| Column {
+        wheel_speed_rpm: cells[0].wheel_speed_rpm,
+        cells: cells.to_vec(),
     };
-    let coarse = coarse?;
-    let measure = |rpm, volts| watch.point(|| cell(&at(rpm, volts), plan.timing));
-    let refined = coarse
-        .par_windows(2)
-        .with_max_len(1)
-        .map(|pair| refine(&pair[0], &pair[1], plan.edge_width_v, &measure))
-        .collect::<Option<Result<Vec<_>, _>>>();
-    let Some(refined) = refined else {
-        return Ok(None);
-    };
-    let mut cells = coarse;
-    cells.extend(refined?.into_iter().flatten());
-    let column = |wheel_speed_rpm| {
-        let own = |cell: &&Cell| cell.wheel_speed_rpm == wheel_speed_rpm;
-        let mut cells: Vec<Cell> = cells.iter().filter(own).copied().collect();
-        cells.sort_by(|a, b| a.amplitude_v.total_cmp(&b.amplitude_v));
-        Column {
-            wheel_speed_rpm,
-            cells,
-        }
-    };
-    Ok(Some(plan.speeds_rpm.iter().map(column).collect()))
+    Ok(Some(columns.map(column).collect()))
 }
 
-/// The cells that a bisection between two of a column adds; `None` if it was stopped.
-fn refine(
-    lower: &Cell,
-    upper: &Cell,
-    width_v: f64,
-    measure: &impl Fn(f64, f64) -> Option<Result<Cell, SweepError>>,
-) -> Option<Result<Vec<Cell>, SweepError>> {
+/// The amplitude between two cells of a column with an edge that is too wide between them, V.
+fn middle_v(lower: &Cell, upper: &Cell, width_v: f64) -> Option<f64> {
     let same_column = lower.wheel_speed_rpm == upper.wheel_speed_rpm;
     let wide = upper.amplitude_v - lower.amplitude_v > width_v;
     let (below, above) = (lower.class(), upper.class());
     let edge = below != above && (below.is_calm() || above.is_calm());
-    if !(same_column && wide && edge) {
-        return Some(Ok(Vec::new()));
-    }
-    let middle_v = 0.5 * (lower.amplitude_v + upper.amplitude_v);
-    let middle = match measure(lower.wheel_speed_rpm, middle_v)? {
-        Ok(middle) => middle,
-        Err(error) => return Some(Err(error)),
-    };
-    let halves = [(lower, &middle), (&middle, upper)];
-    let mut cells = vec![middle];
-    for (lower, upper) in halves {
-        match refine(lower, upper, width_v, measure)? {
-            Ok(more) => cells.extend(more),
-            Err(error) => return Some(Err(error)),
-        }
-    }
-    Some(Ok(cells))
+    (same_column && wide && edge).then(|| 0.5 * (lower.amplitude_v + upper.amplitude_v))
 }

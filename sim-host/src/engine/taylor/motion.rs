@@ -90,7 +90,8 @@ pub struct Found<const K: usize> {
 }
 
 impl<const K: usize> Found<K> {
-    pub(super) fn at(start: &State<f64>) -> Self {
+    /// Nothing yet, of a motion at its start.
+    pub fn at(start: &State<f64>) -> Self {
         Self {
             end: *start,
             diverged: None,

@@ -1,0 +1,101 @@
+//! What motions do behind their transients: by the engine, many side by side.
+
+use crate::chaos::fixed_step;
+use crate::chaos::lyapunov::{PIECES, WARM_UP};
+use crate::chaos::sweep::{Timing, Watch};
+use crate::engine::taylor::{Found, Motions, Span, Unfit, Watched};
+use crate::motion::{Diverged, Motion};
+use shared_model::friction::FrictionLaw;
+use shared_model::{InvalidScenario, Scenario};
+
+/// Largest last term of a step's expansion, in rad and rad/s.
+const TOLERANCE: f64 = 1e-10;
+
+/// Follows the scenarios' motions and shows `see` what is found of each behind its transient, with `K` tangent vectors. The
+/// dither is averaged and on from the start.
+///
+/// Times found count from the transient's end, only that of a divergence from the motion's start. Results are in the
+/// scenarios' order; motions that were not begun have none.
+///
+/// # Errors
+/// If a scenario is not valid.
+pub fn observe<const K: usize, R: Send>(
+    scenarios: &[Scenario<f64>],
+    timing: Timing,
+    watched: Watched,
+    watch: Watch,
+    see: impl Fn(&Scenario<f64>, &Found<K>) -> R + Sync,
+) -> Result<Vec<Option<R>>, InvalidScenario> {
+    let (mut fit, mut unfit) = (Vec::new(), Vec::new());
+    for (k, scenario) in scenarios.iter().enumerate() {
+        let places = if is_fit(scenario)? {
+            &mut fit
+        } else {
+            &mut unfit
+        };
+        places.push(k);
+    }
+    let by_engine = watch.batches(&fit, |batch| {
+        let batch: Vec<_> = batch.iter().map(|&k| scenarios[k]).collect();
+        let found = follow(&batch, timing, watched);
+        batch.iter().zip(&found).map(|(s, f)| see(s, f)).collect()
+    });
+    let by_steps = watch.points(&unfit, |&k| {
+        let found = fixed_step::observe(&scenarios[k], timing, watched);
+        found.map(|found| see(&scenarios[k], &found))
+    });
+    let mut results: Vec<_> = scenarios.iter().map(|_| None).collect();
+    for (k, result) in fit.into_iter().zip(by_engine) {
+        results[k] = result;
+    }
+    for (k, result) in unfit.into_iter().zip(by_steps) {
+        results[k] = result.transpose()?;
+    }
+    Ok(results)
+}
+
+/// Whether the engine can follow the motion: its right-hand side is a polynomial between friction events, and where friction
+/// steps the motion can stick. Else it may slide along the step, meeting it ever more often.
+fn is_fit(scenario: &Scenario<f64>) -> Result<bool, InvalidScenario> {
+    match Motions::new(std::slice::from_ref(scenario)) {
+        Ok(_) => {}
+        Err(Unfit::NotPolynomial) => return Ok(false),
+        Err(Unfit::Invalid(error)) => return Err(error),
+    }
+    let motion = Motion::new(scenario)?;
+    Ok(scenario.friction.law == FrictionLaw::None || motion.model().can_stick(motion.injection()))
+}
+
+/// The motions of scenarios that the engine can follow.
+fn follow<const K: usize>(
+    scenarios: &[Scenario<f64>],
+    timing: Timing,
+    watched: Watched,
+) -> Vec<Found<K>> {
+    let transient = Span {
+        time_s: timing.transient_s,
+        tolerance: TOLERANCE,
+        watched: Watched::default(),
+        warm_up_s: 0.0,
+        pieces: 0,
+    };
+    let (warm_up, pieces) = if K == 0 { (0.0, 0) } else { (WARM_UP, PIECES) };
+    let observed = Span {
+        time_s: timing.observed_s,
+        watched,
+        warm_up_s: warm_up * timing.observed_s,
+        pieces,
+        ..transient
+    };
+    let mut motions = Motions::new(scenarios).expect("the engine can follow each of them");
+    let settled = motions.follow::<0>(&transient);
+    motions.go_on_from(&settled);
+    let mut found = motions.follow::<K>(&observed);
+    for (found, settled) in found.iter_mut().zip(settled) {
+        let later = |diverged: Diverged| Diverged {
+            time_s: timing.transient_s + diverged.time_s,
+        };
+        found.diverged = settled.diverged.or(found.diverged.map(later));
+    }
+    found
+}
