@@ -56,14 +56,12 @@ fn scenarios() -> Vec<Scenario<f64>> {
     stepped.dither.waveform = Waveform::Square;
     stepped.dither.amplitude_v = 5e-4;
     scenarios.push(stepped);
-    // The steering angle passes both steps.
-    stepped.friction.law = FrictionLaw::PrintedAngle;
-    stepped.dither.amplitude_v = 0.05;
-    stepped.run.steering_angle_rad = -0.1;
-    stepped.run.steering_rate_rad_per_s = 6.0;
-    scenarios.push(stepped);
-    stepped.dither.waveform = Waveform::None;
-    scenarios.push(stepped);
+    // The sign of the steering angle, which passes zero.
+    let mut passing = at_speed(1750.0);
+    passing.friction.law = FrictionLaw::PrintedAngle;
+    passing.run.steering_angle_rad = -0.1;
+    passing.run.steering_rate_rad_per_s = 6.0;
+    scenarios.push(passing);
     scenarios
 }
 
