@@ -282,8 +282,8 @@ impl WithSimd for Peak {
         let mut sums = [simd.splat_f64s(black_box(1.0)); CHAINS];
         let start = cpu_s();
         for _ in 0..ROUNDS {
-            for chain in 0..CHAINS {
-                sums[chain] = simd.mul_add_f64s(sums[chain], factor, factor);
+            for sum in &mut sums {
+                *sum = simd.mul_add_f64s(*sum, factor, factor);
             }
         }
         let time_s = cpu_s() - start;

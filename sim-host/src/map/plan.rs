@@ -274,7 +274,7 @@ mod tests {
     #[test]
     fn a_plan_is_read_back_as_it_was_written() {
         let mut plan = plan();
-        plan.scenario.vehicle.mass_kg = 1234.567_890_123_456_7;
+        plan.scenario.vehicle.mass_kg = 1_234.567_890_123_456_7;
         let json = serde_json::to_string(&plan).unwrap();
         let read: Plan = serde_json::from_str(&json).unwrap();
         assert_eq!(read, plan);
