@@ -313,6 +313,15 @@ mod tests {
     }
 
     #[test]
+    fn every_warning_has_a_name_of_its_own() {
+        for (k, warning) in Warning::ALL.into_iter().enumerate() {
+            assert!(!warning.name().is_empty());
+            let before = &Warning::ALL[..k];
+            assert!(before.iter().all(|other| other.name() != warning.name()));
+        }
+    }
+
+    #[test]
     fn a_lower_speed_limit_of_one_channel_is_told() {
         for channel in [0, 1] {
             let mut scenario = Scenario::reconstruction();
