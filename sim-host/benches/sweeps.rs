@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;
-use sim_host::engine::taylor::{Found, Motions, Span, Watched};
+use sim_host::engine::taylor::{Found, Motions, ORDER, Span, Watched};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
@@ -43,8 +43,6 @@ const TOLERANCES: [f64; 11] = [
 /// Length of a motion of job M, s, half of it a transient.
 const MAP_TIME_S: f64 = 200.0;
 const MAP_TOLERANCE: f64 = 1e-10;
-/// Order of the expansion, as the engine has it.
-const ORDER: usize = 12;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Job {

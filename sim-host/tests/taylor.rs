@@ -54,8 +54,10 @@ fn scenarios() -> Vec<Scenario<f64>> {
     let mut stepped = at_speed(1750.0);
     stepped.friction.dithered = true;
     stepped.dither.waveform = Waveform::Square;
-    stepped.dither.amplitude_v = 5e-4;
-    scenarios.push(stepped);
+    for amplitude_v in [2e-4, 5e-4] {
+        stepped.dither.amplitude_v = amplitude_v;
+        scenarios.push(stepped);
+    }
     // The sign of the steering angle, which passes zero.
     let mut passing = at_speed(1750.0);
     passing.friction.law = FrictionLaw::PrintedAngle;

@@ -12,7 +12,7 @@ use shared_model::tire::Tire;
 use shared_model::vehicle::{Model, SIDESLIP, STEERING_ANGLE, STEERING_RATE, SlipForm, YAW_RATE};
 
 /// Order of the expansion.
-pub(super) const ORDER: usize = 12;
+pub const ORDER: usize = 12;
 
 /// Coefficients 0 to `ORDER` of one quantity.
 pub(super) type Series<S, const V: usize> = [Lanes<S, V>; ORDER + 1];

@@ -321,11 +321,11 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         let from = motion.mode;
         if from != FrictionMode::Sticking {
             // Just beyond, whatever rounding left.
-            let beyond = match from {
-                FrictionMode::Positive => bound.next_down(),
-                FrictionMode::Negative => bound.next_up(),
-                _ if x[argument] < bound => bound.next_up(),
-                _ => bound.next_down(),
+            let is_lower = bound == Guard::of(model, injection, from).lower;
+            let beyond = if is_lower {
+                bound.next_down()
+            } else {
+                bound.next_up()
             };
             x[argument] = beyond;
         }

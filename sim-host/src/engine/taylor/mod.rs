@@ -15,4 +15,5 @@ mod lanes;
 mod motion;
 mod roots;
 
+pub use expansion::ORDER;
 pub use motion::{Crossing, Found, Growths, Motions, Span, Unfit, Watched};
