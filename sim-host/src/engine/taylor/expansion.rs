@@ -153,19 +153,26 @@ struct Axle<S: Simd, const V: usize> {
 
 impl<S: Simd, const V: usize> Axle<S, V> {
     /// Coefficient `n` of force and slope: F = alpha (k1 - k2 alpha^2), dF/dalpha = k1 - 3 k2 alpha^2.
+    ///
+    /// What the slip angle's newest coefficient adds to the force is one product with the slope: the next order waits for no more.
     #[inline(always)]
     fn load(&mut self, n: usize, linear: Lanes<S, V>, cubic: Lanes<S, V>, with_slope: bool) {
-        let softening = cubic * square(&self.slip_angle, n);
-        let (secant, slope) = if n == 0 {
-            (linear + softening, linear + softening.scale(3.0))
-        } else {
-            (softening, softening.scale(3.0))
-        };
-        self.secant[n] = secant;
-        if with_slope {
-            self.slope[n] = slope;
+        let angle = &self.slip_angle;
+        if n == 0 {
+            let softening = cubic * (angle[0] * angle[0]);
+            self.secant[0] = linear + softening;
+            self.slope[0] = linear + softening.scale(3.0);
+            self.force[0] = self.secant[0] * angle[0];
+            return;
         }
-        self.force[n] = product(&self.secant, &self.slip_angle, n);
+        let inner = inner_square(angle, n);
+        let known = inner.mul_add(cubic * angle[0], inner_product(&self.secant, angle, n));
+        self.force[n] = self.slope[0].mul_add(angle[n], known);
+        let softening = cubic * (angle[0] + angle[0]).mul_add(angle[n], inner);
+        self.secant[n] = softening;
+        if with_slope {
+            self.slope[n] = softening.scale(3.0);
+        }
     }
 }
 
@@ -176,19 +183,26 @@ fn product<S: Simd, const V: usize>(a: &Series<S, V>, b: &Series<S, V>, n: usize
     if n == 0 {
         return a[0] * b[0];
     }
+    a[n].mul_add(b[0], a[0].mul_add(b[n], inner_product(a, b, n)))
+}
+
+/// The same without the terms that have a coefficient of order `n`.
+#[inline(always)]
+fn inner_product<S: Simd, const V: usize>(
+    a: &Series<S, V>,
+    b: &Series<S, V>,
+    n: usize,
+) -> Lanes<S, V> {
     let mut sum = a[0].zero();
     for j in 1..n {
         sum = a[j].mul_add(b[n - j], sum);
     }
-    a[n].mul_add(b[0], a[0].mul_add(b[n], sum))
+    sum
 }
 
-/// Coefficient `n` of the square of a series.
+/// Coefficient `n` of the square of a series, without the term that has its coefficient of order `n`.
 #[inline(always)]
-fn square<S: Simd, const V: usize>(a: &Series<S, V>, n: usize) -> Lanes<S, V> {
-    if n == 0 {
-        return a[0] * a[0];
-    }
+fn inner_square<S: Simd, const V: usize>(a: &Series<S, V>, n: usize) -> Lanes<S, V> {
     let mut sum = a[0].zero();
     for j in 1..n.div_ceil(2) {
         sum = a[j].mul_add(a[n - j], sum);
@@ -197,8 +211,7 @@ fn square<S: Simd, const V: usize>(a: &Series<S, V>, n: usize) -> Lanes<S, V> {
     if n.is_multiple_of(2) {
         sum = a[n / 2].mul_add(a[n / 2], sum);
     }
-    let first = a[0] + a[0];
-    first.mul_add(a[n], sum)
+    sum
 }
 
 /// Value at `t` of a series.
@@ -297,8 +310,8 @@ impl<S: Simd, const V: usize, const K: usize> Expansion<S, V, K> {
             let (front_angle, rear_angle) = slip_angles(system, &tangent.x, N);
             tangent.front_slip_angle[N] = front_angle;
             tangent.rear_slip_angle[N] = rear_angle;
-            let front_force = product(&front.slope, &tangent.front_slip_angle, N);
-            let rear_force = product(&rear.slope, &tangent.rear_slip_angle, N);
+            let front_force = product(&tangent.front_slip_angle, &front.slope, N);
+            let rear_force = product(&tangent.rear_slip_angle, &rear.slope, N);
             advance(system, &mut tangent.x, N, front_force, rear_force);
         }
     }

@@ -1,8 +1,10 @@
 //! The steps: many motions in lanes, each with its own time.
 
 use super::expansion::{Expansion, ORDER, Series, System, value};
+use super::guard::{Guards, RELEASE_MARGIN};
 use super::lanes::Lanes;
-use super::motion::{Crossing, Found, Span, Task};
+use super::motion::{Crossing, Found, Span};
+use super::queue::{LONGEST_STEP_S, Motion, Numbers, Queue, Waiting};
 use super::roots::{self, derivative};
 use crate::engine::events::{Guard, next_mode};
 use crate::motion::Diverged;
@@ -12,8 +14,6 @@ use pulp::Simd;
 use shared_model::friction::FrictionMode;
 use shared_model::vehicle::{STEERING_RATE, State};
 
-/// Longest step, s.
-const LONGEST_STEP_S: f64 = 0.2;
 /// A motion that needs a step shorter than this leaves all bounds, s.
 const SHORTEST_STEP_S: f64 = 1e-9;
 /// Factor by which a step shrinks until it meets the tolerance, and its inverse by which it grows where that would have met it.
@@ -22,53 +22,39 @@ const SHRINK: f64 = 0.92;
 const MOST_SHRINKS: usize = 300;
 /// A rate of change below this (in the component's unit a second) is rounding, which has turning points of its own.
 const RATE_FLOOR: f64 = 1e-13;
-/// Least time between two changes of mode, s: an end sooner than that is rounding of the torque at its limit.
-const SHORTEST_MODE_S: f64 = 1e-9;
 /// A mode shorter than this, s, is one of a row in which a motion slides along a step of its friction law, and so many of them are
 /// one too many.
 const SHORT_MODE_S: f64 = 1e-6;
 const MOST_SHORT_MODES: usize = 1000;
-/// Share of the friction limit by which the torque must exceed it before the steering leaves rest. At rest right at the limit
-/// rounding would otherwise release it and stop it for ever.
-const RELEASE_MARGIN: f64 = 1e-10;
+/// After so many steps another of the last motions waits for its turn.
+const STEPS_A_TURN: usize = 64;
 /// Lengths of a tangent vector, squared, that leave room for a step's growth.
 const LENGTHS_SQUARED: (f64, f64) = (1e-200, 1e200);
 /// A tangent vector is lost when orthogonalisation leaves less than this share of it, squared.
 const LOST_SQUARED: f64 = 1e-24;
 
-/// One motion in its lane.
-struct Lane<'a, const K: usize> {
-    task: &'a Task,
-    /// Index of the task.
-    index: usize,
-    /// Steps of the flight before it.
-    steps_before: usize,
-    mode: FrictionMode,
-    /// Changes of mode in a row that came too soon.
-    short_modes: usize,
-    /// Index of the piece that it is in.
-    piece: usize,
-    /// Logarithms of the tangent vectors' growth since the piece began.
-    growth: [f64; K],
-    found: Found<K>,
-}
+/// What was found of the task with an index.
+pub(super) type Result<const K: usize> = (usize, Found<K>);
 
 /// Motions on their way.
 pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize> {
     simd: S,
     span: &'a Span,
-    tasks: &'a [Task],
+    queue: &'a Queue<'a, K>,
     /// Ends of the pieces, s from the start.
     ends_s: Vec<f64>,
-    next_task: usize,
     steps: usize,
-    lanes: Vec<Option<Lane<'a, K>>>,
-    results: Vec<Option<Found<K>>>,
+    lanes: Vec<Option<Motion<'a, K>>>,
+    /// How many lanes have a motion.
+    aboard: usize,
+    /// Whose turn it is to wait.
+    turn: usize,
+    results: Vec<Result<K>>,
     /// Index of the friction law's argument in a state, if a mode can end at all.
     argument: Option<usize>,
     system: System<Lanes<S, V>>,
     expansion: Expansion<S, V, K>,
-    guard: GuardLanes<Lanes<S, V>>,
+    guards: Guards<Lanes<S, V>>,
     /// The step that the tolerance allows, s.
     step_s: Lanes<S, V>,
     /// What is left of the piece, s; infinite in an empty lane.
@@ -79,57 +65,81 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize> {
     stretch: [Lanes<S, V>; K],
 }
 
-/// [`Guard`]s in lanes, of the quantity `argument + per_force * F_f`.
-struct GuardLanes<L> {
-    lower: L,
-    upper: L,
-    /// Minus the trail while sticking, else 0.
-    per_force: L,
-}
-
 impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
-    /// Motions at their starts, all with the same friction argument.
-    pub fn new(simd: S, tasks: &'a [Task], span: &'a Span) -> Self {
+    /// Up to `most` motions of the queue.
+    pub fn new(simd: S, queue: &'a Queue<'a, K>, span: &'a Span, most: usize) -> Self {
+        let mut flight = Self::empty(simd, queue, span);
+        for lane in 0..most.min(Lanes::<S, V>::COUNT) {
+            flight.load_next(lane);
+        }
+        flight
+    }
+
+    fn empty(simd: S, queue: &'a Queue<'a, K>, span: &'a Span) -> Self {
         let splat = |number| Lanes::splat(simd, number);
         let mut flight = Self {
             simd,
             span,
-            tasks,
+            queue,
             ends_s: span.ends_s(),
-            next_task: 0,
             steps: 0,
-            lanes: Vec::new(),
-            results: tasks.iter().map(|_| None).collect(),
-            argument: tasks.first().and_then(Task::argument),
+            lanes: (0..Lanes::<S, V>::COUNT).map(|_| None).collect(),
+            aboard: 0,
+            turn: 0,
+            results: Vec::new(),
+            argument: queue.argument(),
             system: System::still(simd),
             expansion: Expansion::new(simd),
-            guard: GuardLanes {
-                lower: splat(f64::NEG_INFINITY),
-                upper: splat(f64::INFINITY),
-                per_force: splat(0.0),
-            },
+            guards: Guards::none(simd),
             step_s: splat(0.0),
             left_s: splat(f64::INFINITY),
             ends_of_modes: Vec::new(),
             stretch: [splat(1.0); K],
         };
         for lane in 0..Lanes::<S, V>::COUNT {
-            flight.lanes.push(None);
-            flight.load_next(lane);
+            flight.set_numbers(lane, &Numbers::of_nobody());
         }
         flight
     }
 
-    /// Follows all motions to their ends.
-    #[inline(always)]
-    pub fn run(mut self) -> Vec<Found<K>> {
-        while self.lanes.iter().any(Option::is_some) {
-            self.step();
+    /// Takes over the motions of a flight with more lanes, of which no more have one than this has lanes.
+    pub fn taking_over<const W: usize>(mut wider: Flight<'a, S, W, K>) -> Self {
+        let mut flight = Self::empty(wider.simd, wider.queue, wider.span);
+        let aboard = (0..wider.lanes.len()).filter_map(|lane| wider.take(lane));
+        for (lane, motion) in aboard.enumerate() {
+            flight.load(lane, motion);
         }
-        let results = self.results.into_iter();
-        results
-            .map(|found| found.expect("every motion ends"))
-            .collect()
+        flight.results = wider.results;
+        flight
+    }
+
+    /// Goes on until no more than `fewest` motions are aboard.
+    #[inline(always)]
+    pub fn run(&mut self, fewest: usize) {
+        while self.aboard > fewest {
+            self.step();
+            if self.steps.is_multiple_of(STEPS_A_TURN) {
+                self.take_turns();
+            }
+        }
+    }
+
+    /// The last motions share the lanes by turns, so that none of them is left to go on alone at the end.
+    #[inline(never)]
+    fn take_turns(&mut self) {
+        if !(1..=self.lanes.len()).contains(&self.queue.len()) {
+            return;
+        }
+        self.turn = (self.turn + 1) % self.lanes.len();
+        if let Some(motion) = self.take(self.turn) {
+            self.queue.push(motion);
+            self.load_next(self.turn);
+        }
+    }
+
+    /// What was found of the motions at their ends.
+    pub fn results(self) -> Vec<Result<K>> {
+        self.results
     }
 
     #[inline(always)]
@@ -194,28 +204,17 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
     #[inline(always)]
     fn find_ends_of_modes(&mut self, argument: usize, step_s: &mut Lanes<S, V>) {
         let (x, force) = (&self.expansion.x[argument], self.expansion.front_force());
-        let guard = &self.guard;
-        let mut series = *x;
-        for k in 0..ORDER {
-            series[k] = guard.per_force.mul_add(force[k], x[k]);
-        }
-        let (begin, end) = (series[0], value(&series, *step_s));
-        let lowest = begin.min(end) - guard.lower;
-        let highest = guard.upper - begin.max(end);
-        let least = lowest.min(highest);
-        let bend = bend(&series, *step_s);
-        if bend.all_less(least) {
+        let room = self.guards.room(x, force, *step_s);
+        if room.zero().all_less(room) {
             return;
         }
         for lane in 0..Lanes::<S, V>::COUNT {
-            if bend.as_slice()[lane] < least.as_slice()[lane] || self.lanes[lane].is_none() {
+            if room.as_slice()[lane] > 0.0 || self.lanes[lane].is_none() {
                 continue;
             }
-            let polynomial = series.each_ref().map(|c| c.as_slice()[lane]);
-            let bounds = [guard.lower, guard.upper].map(|bound| bound.as_slice()[lane]);
-            let most_s = step_s.as_slice()[lane];
-            if let Some((instant_s, bound)) = first_end(&polynomial, bounds, most_s) {
-                step_s.as_mut_slice()[lane] = instant_s;
+            let most_s = &mut step_s.as_mut_slice()[lane];
+            if let Some((instant_s, bound)) = self.guards.first_end(lane, x, force, *most_s) {
+                *most_s = instant_s;
                 self.ends_of_modes.push((lane, bound));
             }
         }
@@ -374,20 +373,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         let system = System::new(model, injection, motion.mode);
         self.system
             .set_lane(lane, system.expect("every task was checked"));
-        let guard = Guard::of(model, injection, motion.mode);
-        let constants = model.constants();
-        // While sticking the guard is the driving torque, whose constant goes over to the bounds.
-        let (per_force, shift, wider) = match motion.mode {
-            FrictionMode::Sticking => (
-                -constants.trail_m,
-                constants.motor_torque_nm,
-                1.0 + RELEASE_MARGIN,
-            ),
-            _ => (0.0, 0.0, 1.0),
-        };
-        self.guard.per_force.as_mut_slice()[lane] = per_force;
-        self.guard.lower.as_mut_slice()[lane] = guard.lower * wider - shift;
-        self.guard.upper.as_mut_slice()[lane] = guard.upper * wider - shift;
+        self.guards.set_lane(lane, model, injection, motion.mode);
     }
 
     /// Keeps a single tangent vector within the range of numbers; several at right angles and of length one, by Gram and Schmidt.
@@ -533,110 +519,68 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
 
     /// Puts a motion's findings aside, and the next motion into its lane.
     fn unload(&mut self, lane: usize) {
-        let x = self.state(lane);
-        if let Some(mut motion) = self.lanes[lane].take() {
-            motion.found.steps = self.steps - motion.steps_before;
+        if let Some((mut motion, numbers)) = self.take(lane) {
             motion.found.end = State {
-                x: x.into(),
+                x: numbers.x.into(),
                 friction: motion.mode,
             };
-            for (i, x) in x.into_iter().enumerate() {
+            for (i, x) in numbers.x.into_iter().enumerate() {
                 motion.found.extend(i, x);
             }
-            self.results[motion.index] = Some(motion.found);
+            self.results.push((motion.index, motion.found));
         }
         self.load_next(lane);
     }
 
     fn load_next(&mut self, lane: usize) {
-        self.system.set_lane(lane, System::STILL);
-        self.guard.lower.as_mut_slice()[lane] = f64::NEG_INFINITY;
-        self.guard.upper.as_mut_slice()[lane] = f64::INFINITY;
-        self.guard.per_force.as_mut_slice()[lane] = 0.0;
-        let task = self.tasks.get(self.next_task);
-        let start = task.map_or([0.0; 4], |task| task.start.x.into());
-        for i in 0..4 {
-            self.expansion.x[i][0].as_mut_slice()[lane] = start[i];
-            for (k, tangent) in self.expansion.tangents.iter_mut().enumerate() {
-                // Linearly independent, and none along an axis, which may be invariant; a steering that sticks has no rate.
-                let sticks = task.is_some_and(|t| t.start.friction == FrictionMode::Sticking);
-                let part = match i {
-                    STEERING_RATE if sticks => 0.0,
-                    _ if i == k => 1.5,
-                    _ => 0.5,
-                };
-                tangent.x[i][0].as_mut_slice()[lane] = part;
-            }
+        match self.queue.next() {
+            Some(motion) => self.load(lane, motion),
+            None => self.set_numbers(lane, &Numbers::of_nobody()),
         }
-        for stretch in &mut self.stretch {
-            stretch.as_mut_slice()[lane] = 1.0;
-        }
-        let (step_s, left_s) = match task {
-            Some(_) => (LONGEST_STEP_S, self.ends_s[0]),
-            None => (0.0, f64::INFINITY),
-        };
-        self.step_s.as_mut_slice()[lane] = step_s;
-        self.left_s.as_mut_slice()[lane] = left_s;
-        self.lanes[lane] = task.map(|task| Lane {
-            task,
-            index: self.next_task,
-            steps_before: self.steps,
-            mode: task.start.friction,
-            short_modes: 0,
-            piece: 0,
-            growth: [0.0; K],
-            found: Found::at(&task.start),
-        });
-        self.next_task += 1;
+    }
+
+    fn load(&mut self, lane: usize, (mut motion, numbers): Waiting<'a, K>) {
+        self.set_numbers(lane, &numbers);
+        motion.boarded = self.steps;
+        self.lanes[lane] = Some(motion);
+        self.aboard += 1;
         self.load_mode(lane);
     }
-}
 
-/// The first instant within `most_s` at which a quantity leaves its bounds, and the bound.
-#[inline(never)]
-fn first_end(
-    polynomial: &[f64; ORDER + 1],
-    [lower, upper]: [f64; 2],
-    most_s: f64,
-) -> Option<(f64, f64)> {
-    let above = |bound: f64| {
-        let mut room = *polynomial;
-        room[0] -= bound;
-        room
-    };
-    let ends = [(lower, above(lower)), (upper, above(upper).map(|c| -c))];
-    let mut first: Option<(f64, f64)> = None;
-    for (bound, room) in ends {
-        if !bound.is_finite() {
-            continue;
-        }
-        let until = first.map_or(most_s, |(instant_s, _)| instant_s);
-        if let Some(instant_s) = first_fall(room, until) {
-            first = Some((instant_s, bound));
-        }
+    /// Takes a motion out of its lane, which rests.
+    fn take(&mut self, lane: usize) -> Option<Waiting<'a, K>> {
+        let mut motion = self.lanes[lane].take()?;
+        motion.found.steps += self.steps - motion.boarded;
+        let numbers = Numbers {
+            x: self.state(lane),
+            tangents: self.expansion.tangents.each_ref().map(|tangent| {
+                let coefficient = |x: &Series<S, V>| x[0].as_slice()[lane];
+                tangent.x.each_ref().map(coefficient)
+            }),
+            stretch: self.stretch.map(|stretch| stretch.as_slice()[lane]),
+            step_s: self.step_s.as_slice()[lane],
+            left_s: self.left_s.as_slice()[lane],
+        };
+        self.aboard -= 1;
+        self.system.set_lane(lane, System::STILL);
+        self.guards.free_lane(lane);
+        Some((motion, numbers))
     }
-    first
-}
 
-/// The first instant in (0, `most_s`] at which a polynomial goes from positive to negative; one that begins at zero counts from the
-/// shortest time of a mode on.
-fn first_fall(mut room: [f64; ORDER + 1], most_s: f64) -> Option<f64> {
-    let soon_s = SHORTEST_MODE_S.min(most_s);
-    if room[0] == 0.0 {
-        // On the bound: the root at the beginning is the last change of mode.
-        room.rotate_left(1);
-    }
-    if roots::value(&room, soon_s) < 0.0 {
-        return Some(soon_s);
-    }
-    let slope = derivative(&room);
-    let mut first = None;
-    roots::roots(&room, most_s, |root_s| {
-        if root_s > soon_s && roots::value(&slope, root_s) < 0.0 {
-            first.get_or_insert(root_s);
+    fn set_numbers(&mut self, lane: usize, numbers: &Numbers<K>) {
+        for i in 0..4 {
+            self.expansion.x[i][0].as_mut_slice()[lane] = numbers.x[i];
+            for k in 0..K {
+                let component = &mut self.expansion.tangents[k].x[i][0];
+                component.as_mut_slice()[lane] = numbers.tangents[k][i];
+            }
         }
-    });
-    first
+        for k in 0..K {
+            self.stretch[k].as_mut_slice()[lane] = numbers.stretch[k];
+        }
+        self.step_s.as_mut_slice()[lane] = numbers.step_s;
+        self.left_s.as_mut_slice()[lane] = numbers.left_s;
+    }
 }
 
 /// Bound on how far a polynomial is from its chord within (0, `t`).

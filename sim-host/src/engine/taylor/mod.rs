@@ -11,8 +11,10 @@
 
 mod expansion;
 mod flight;
+mod guard;
 mod lanes;
 mod motion;
+mod queue;
 mod roots;
 
 pub use expansion::ORDER;

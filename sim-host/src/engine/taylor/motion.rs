@@ -1,7 +1,8 @@
 //! What is asked of the engine, and what it finds.
 
 use super::expansion::System;
-use super::flight::Flight;
+use super::flight::{self, Flight};
+use super::queue::Queue;
 use crate::motion::Diverged;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -12,8 +13,6 @@ use shared_model::{InvalidScenario, Scenario};
 
 /// Vectors side by side: enough to hide the latency of a multiplication.
 const VECTORS: usize = 2;
-/// Motions that a thread takes at once.
-const MOTIONS_A_THREAD: usize = 64;
 
 /// What is looked at on the way, beside the end. Each costs some percent.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -185,13 +184,7 @@ impl Motions {
     fn follow_by<const K: usize>(&self, arch: Arch, span: &Span) -> Vec<Found<K>> {
         // A flight watches one argument of the friction law.
         let alike = self.tasks.chunk_by(|a, b| a.argument() == b.argument());
-        let chunks: Vec<&[Task]> = alike
-            .flat_map(|tasks| tasks.chunks(MOTIONS_A_THREAD))
-            .collect();
-        chunks
-            .par_iter()
-            .flat_map_iter(|tasks| arch.dispatch(Follow { tasks, span }))
-            .collect()
+        alike.flat_map(|tasks| follow(arch, tasks, span)).collect()
     }
 
     /// Goes on from where the motions were found to end.
@@ -202,17 +195,38 @@ impl Motions {
     }
 }
 
-struct Follow<'a, const K: usize> {
-    tasks: &'a [Task],
-    span: &'a Span,
+/// Follows tasks that are alike, each thread as many side by side as it has lanes.
+fn follow<const K: usize>(arch: Arch, tasks: &[Task], span: &Span) -> Vec<Found<K>> {
+    let queue = &Queue::new(tasks, span.ends_s()[0]);
+    let threads = rayon::current_num_threads();
+    let most = tasks.len().div_ceil(threads);
+    let flights = (0..threads).into_par_iter();
+    let mut results: Vec<_> = flights
+        .flat_map_iter(|_| arch.dispatch(Fly { queue, span, most }))
+        .collect();
+    results.sort_unstable_by_key(|&(index, _)| index);
+    results.into_iter().map(|(_, found)| found).collect()
 }
 
-impl<const K: usize> WithSimd for Follow<'_, K> {
-    type Output = Vec<Found<K>>;
+/// One thread's share.
+struct Fly<'a, const K: usize> {
+    queue: &'a Queue<'a, K>,
+    span: &'a Span,
+    most: usize,
+}
+
+impl<const K: usize> WithSimd for Fly<'_, K> {
+    type Output = Vec<flight::Result<K>>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        Flight::<S, VECTORS, K>::new(simd, self.tasks, self.span).run()
+        let Self { queue, span, most } = self;
+        let mut flight = Flight::<S, VECTORS, K>::new(simd, queue, span, most);
+        flight.run(S::F64_LANES);
+        // The last ones fit into one vector.
+        let mut last = Flight::<S, 1, K>::taking_over(flight);
+        last.run(0);
+        last.results()
     }
 }
 
@@ -254,7 +268,8 @@ mod tests {
         }
     }
 
-    /// Neither the instruction set nor the neighbours in a vector change a bit.
+    /// Neither the instruction set, nor the neighbours in a vector, nor the number of threads changes a bit. On one thread the
+    /// motions are more than its lanes, and take turns.
     #[test]
     fn bits_are_the_same_on_every_path_and_in_every_company() {
         let scenarios = scenarios();
@@ -262,8 +277,13 @@ mod tests {
         let portable = motions.follow_by::<2>(Arch::Scalar, &span());
         let v3 = V3::try_new().map(Arch::V3);
         let v4 = V4::try_new().map(Arch::V4);
-        for arch in [v3, v4].into_iter().flatten() {
-            assert_eq!(motions.follow_by::<2>(arch, &span()), portable, "{arch:?}");
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            pool.expect("threads can be started").install(|| {
+                for arch in [v3, v4].into_iter().flatten() {
+                    assert_eq!(motions.follow_by::<2>(arch, &span()), portable, "{arch:?}");
+                }
+            });
         }
         let alone = |scenario: &Scenario<f64>| {
             let motion = Motions::new(std::slice::from_ref(scenario)).expect("it fits");

@@ -1,27 +1,32 @@
 //! Roots of a step's polynomial, to machine precision.
 
+use super::expansion::ORDER;
+
 /// Width, as a share of the step, at which an interval with several roots counts as one: a root of higher order.
 const NARROWEST: f64 = 1e-12;
 /// Iterations by which a bracketed root has long been found.
 const MOST_ITERATIONS: usize = 80;
 
-/// Value at `t` of the polynomial with these coefficients, the constant one first. Even and odd powers on their own, which the
-/// processor adds up side by side.
-pub(super) fn value<const N: usize>(polynomial: &[f64; N], t: f64) -> f64 {
+/// Coefficients of a step's polynomial, the constant one first.
+pub(super) type Polynomial = [f64; ORDER + 1];
+
+/// Value at `t`. Pairs of terms, then pairs of pairs, by Estrin: the processor adds them up side by side.
+#[inline(always)]
+pub(super) fn value(polynomial: &Polynomial, t: f64) -> f64 {
+    const { assert!(ORDER == 12) };
+    let c = polynomial;
     let square = t * t;
-    let (mut even, mut odd) = (0.0, 0.0);
-    for k in (0..N).rev() {
-        if k % 2 == 0 {
-            even = even * square + polynomial[k];
-        } else {
-            odd = odd * square + polynomial[k];
-        }
-    }
-    odd * t + even
+    let fourth = square * square;
+    let pair = |k: usize| c[k + 1].mul_add(t, c[k]);
+    let low = pair(2).mul_add(square, pair(0));
+    let middle = pair(6).mul_add(square, pair(4));
+    let high = c[12].mul_add(fourth, pair(10).mul_add(square, pair(8)));
+    high.mul_add(fourth * fourth, middle.mul_add(fourth, low))
 }
 
 /// Coefficients of the derivative.
-pub(super) fn derivative<const N: usize>(polynomial: &[f64; N]) -> [f64; N] {
+#[inline(always)]
+pub(super) fn derivative(polynomial: &Polynomial) -> Polynomial {
     std::array::from_fn(|k| match polynomial.get(k + 1) {
         Some(c) => (k + 1) as f64 * c,
         None => 0.0,
@@ -31,44 +36,49 @@ pub(super) fn derivative<const N: usize>(polynomial: &[f64; N]) -> [f64; N] {
 /// Shows `see` the roots within (0, `end`], ascending, by Bernstein's form: the signs of its coefficients bound the number of
 /// roots, and where they leave open how many there are, the interval is halved. Roots where the sign does not change may be
 /// left out.
-pub(super) fn roots<const N: usize>(polynomial: &[f64; N], end: f64, mut see: impl FnMut(f64)) {
-    if is_monotone(polynomial, end) {
+#[inline(always)]
+pub(super) fn roots(polynomial: &Polynomial, end: f64, mut see: impl FnMut(f64)) {
+    if is_monotone(&derivative(polynomial), end) {
         if (polynomial[0] < 0.0) != (value(polynomial, end) < 0.0) {
             see(refine(polynomial, 0.0, end));
         }
         return;
     }
     let bernstein = to_bernstein(polynomial, end);
-    isolate(&bernstein, 0.0, 1.0, &mut |from, to| {
-        see(refine(polynomial, from * end, to * end));
-    });
-}
-
-/// The linear term outweighs all others within (0, `end`): the usual case, in which there is at most one root.
-fn is_monotone<const N: usize>(polynomial: &[f64; N], end: f64) -> bool {
-    let mut others = 0.0;
-    for k in (2..N).rev() {
-        others = (others + k as f64 * polynomial[k].abs()) * end;
+    match sign_changes(&bernstein) {
+        0 => {}
+        1 => see(refine(polynomial, 0.0, end)),
+        _ => isolate(&bernstein, 0.0, 1.0, &mut |from, to| {
+            see(refine(polynomial, from * end, to * end));
+        }),
     }
-    polynomial[1].abs() > others
 }
 
-/// Coefficients in Bernstein's basis of degree N - 1 on [0, `end`].
-fn to_bernstein<const N: usize>(polynomial: &[f64; N], end: f64) -> [f64; N] {
+/// The linear term outweighs all others within (0, `end`), given the derivative: the usual case, in which there is at most one
+/// root.
+#[inline(always)]
+fn is_monotone(slope: &Polynomial, end: f64) -> bool {
+    let mut others = slope.map(f64::abs);
+    others[0] = 0.0;
+    slope[0].abs() > value(&others, end)
+}
+
+/// Coefficients in Bernstein's basis of degree ORDER on [0, `end`].
+fn to_bernstein(polynomial: &Polynomial, end: f64) -> Polynomial {
     // b_i = sum over j <= i of C(i, j)/C(n, j) a_j end^j.
     let mut power = 1.0;
     let mut binomial = 1.0;
-    let scaled: [f64; N] = std::array::from_fn(|j| {
+    let scaled: Polynomial = std::array::from_fn(|j| {
         if j > 0 {
             power *= end;
-            binomial *= (N - j) as f64 / j as f64;
+            binomial *= (ORDER + 1 - j) as f64 / j as f64;
         }
         polynomial[j] * power / binomial
     });
     let mut sums = scaled;
     // Differences undone: each pass adds Pascal's triangle up.
-    for first in (1..N).rev() {
-        for k in first..N {
+    for first in (1..=ORDER).rev() {
+        for k in first..=ORDER {
             sums[k] += sums[k - 1];
         }
     }
@@ -76,17 +86,12 @@ fn to_bernstein<const N: usize>(polynomial: &[f64; N], end: f64) -> [f64; N] {
 }
 
 /// Intervals, as shares of the first, on which the sign changes once.
-fn isolate<const N: usize>(
-    bernstein: &[f64; N],
-    from: f64,
-    to: f64,
-    see: &mut impl FnMut(f64, f64),
-) {
+fn isolate(bernstein: &Polynomial, from: f64, to: f64, see: &mut impl FnMut(f64, f64)) {
     match sign_changes(bernstein) {
         0 => {}
         1 => see(from, to),
         _ if to - from < NARROWEST => {
-            if (bernstein[0] < 0.0) != (bernstein[N - 1] < 0.0) {
+            if (bernstein[0] < 0.0) != (bernstein[ORDER] < 0.0) {
                 see(from, to);
             }
         }
@@ -106,11 +111,11 @@ fn sign_changes(sequence: &[f64]) -> usize {
 }
 
 /// The same polynomial on both halves of its interval, by de Casteljau.
-fn halves<const N: usize>(bernstein: &[f64; N]) -> ([f64; N], [f64; N]) {
+fn halves(bernstein: &Polynomial) -> (Polynomial, Polynomial) {
     let mut row = *bernstein;
     let mut left = row;
-    for k in 1..N {
-        for i in 0..N - k {
+    for k in 1..=ORDER {
+        for i in 0..=ORDER - k {
             row[i] = 0.5 * (row[i] + row[i + 1]);
         }
         left[k] = row[0];
@@ -120,12 +125,14 @@ fn halves<const N: usize>(bernstein: &[f64; N]) -> ([f64; N], [f64; N]) {
 }
 
 /// The root between two signs, by Newton from the chord's root within its bracket, and bisection where that leaves it.
-fn refine<const N: usize>(polynomial: &[f64; N], from: f64, to: f64) -> f64 {
+#[inline(always)]
+fn refine(polynomial: &Polynomial, from: f64, to: f64) -> f64 {
     let rate = derivative(polynomial);
     let (mut low, mut high) = (from, to);
     let (first, last) = (value(polynomial, low), value(polynomial, high));
     let begins_negative = first < 0.0;
     let mut t = low + (high - low) * (first / (first - last));
+    let mut move_before = 0.0;
     for _ in 0..MOST_ITERATIONS {
         let (at, slope) = (value(polynomial, t), value(&rate, t));
         if at == 0.0 {
@@ -137,15 +144,19 @@ fn refine<const N: usize>(polynomial: &[f64; N], from: f64, to: f64) -> f64 {
             high = t;
         }
         let newton = t - at / slope;
-        let next = if newton > low && newton < high {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        if (next - t).abs() <= f64::EPSILON * to {
-            return next;
+        if !(newton > low && newton < high) {
+            t = 0.5 * (low + high);
+            move_before = 0.0;
+            continue;
         }
-        t = next;
+        let moved = newton - t;
+        t = newton;
+        // Moves square, times a factor that two of them tell: the next one would be rounding.
+        let ends = moved * moved * moved.abs() <= f64::EPSILON * to * move_before;
+        if ends || moved.abs() <= f64::EPSILON * to {
+            return t;
+        }
+        move_before = moved * moved;
     }
     t
 }
@@ -155,7 +166,7 @@ mod tests {
     use super::*;
 
     /// Coefficients of the product of (t - root).
-    fn with_roots(roots: &[f64]) -> [f64; 13] {
+    fn with_roots(roots: &[f64]) -> Polynomial {
         let mut polynomial = [0.0; 13];
         polynomial[0] = 1.0;
         for root in roots {
@@ -169,7 +180,7 @@ mod tests {
         polynomial
     }
 
-    fn found(polynomial: &[f64; 13], end: f64) -> Vec<f64> {
+    fn found(polynomial: &Polynomial, end: f64) -> Vec<f64> {
         let mut all = Vec::new();
         roots(polynomial, end, |root| all.push(root));
         all
@@ -208,7 +219,11 @@ mod tests {
     }
 
     #[test]
-    fn derivative_by_coefficients() {
-        assert_eq!(derivative(&[5.0, 1.0, 2.0, 3.0]), [1.0, 4.0, 9.0, 0.0]);
+    fn derivative_and_value_by_coefficients() {
+        let ones = [1.0; 13];
+        let slope: Vec<f64> = (1..=13).map(|k| f64::from(k % 13)).collect();
+        assert_eq!(derivative(&ones).to_vec(), slope);
+        assert_eq!(value(&ones, 2.0), 8191.0);
+        assert_eq!(value(&derivative(&ones), 1.0), 78.0);
     }
 }

@@ -1,0 +1,211 @@
+//! Where friction modes end: a quantity of each lane that must stay within bounds, on the step's polynomials.
+
+use super::expansion::{ORDER, Series};
+use super::lanes::Lanes;
+use super::roots;
+use crate::engine::events::Guard;
+use pulp::Simd;
+use shared_model::dither::Injection;
+use shared_model::friction::FrictionMode;
+use shared_model::vehicle::Model;
+
+/// Least time between two changes of mode, s: an end sooner than that is rounding of the torque at its limit.
+const SHORTEST_MODE_S: f64 = 1e-9;
+/// Share of the friction limit by which the torque must exceed it before the steering leaves rest. At rest right at the limit
+/// rounding would otherwise release it and stop it for ever.
+pub(super) const RELEASE_MARGIN: f64 = 1e-10;
+
+/// [`Guard`]s in lanes, of the quantity `argument + per_force * F_f`.
+pub(super) struct Guards<L> {
+    lower: L,
+    upper: L,
+    /// Minus the trail while sticking, else 0.
+    per_force: L,
+}
+
+impl<S: Simd, const V: usize> Guards<Lanes<S, V>> {
+    /// No bounds in any lane.
+    pub fn none(simd: S) -> Self {
+        let splat = |number| Lanes::splat(simd, number);
+        Self {
+            lower: splat(f64::NEG_INFINITY),
+            upper: splat(f64::INFINITY),
+            per_force: splat(0.0),
+        }
+    }
+
+    /// Takes a lane's bounds away.
+    pub fn free_lane(&mut self, lane: usize) {
+        self.lower.as_mut_slice()[lane] = f64::NEG_INFINITY;
+        self.upper.as_mut_slice()[lane] = f64::INFINITY;
+        self.per_force.as_mut_slice()[lane] = 0.0;
+    }
+
+    /// Puts the bounds of a motion's mode into its lane.
+    pub fn set_lane(
+        &mut self,
+        lane: usize,
+        model: &Model<f64>,
+        injection: Injection<f64>,
+        mode: FrictionMode,
+    ) {
+        let guard = Guard::of(model, injection, mode);
+        let constants = model.constants();
+        // While sticking the guard is the driving torque, whose constant goes over to the bounds.
+        let (per_force, shift, wider) = match mode {
+            FrictionMode::Sticking => (
+                -constants.trail_m,
+                constants.motor_torque_nm,
+                1.0 + RELEASE_MARGIN,
+            ),
+            _ => (0.0, 0.0, 1.0),
+        };
+        self.per_force.as_mut_slice()[lane] = per_force;
+        self.lower.as_mut_slice()[lane] = guard.lower * wider - shift;
+        self.upper.as_mut_slice()[lane] = guard.upper * wider - shift;
+    }
+
+    /// Positive in lanes that certainly stay within their bounds for the whole step, given the series of argument and force.
+    #[inline(always)]
+    pub fn room(
+        &self,
+        argument: &Series<S, V>,
+        force: &Series<S, V>,
+        step_s: Lanes<S, V>,
+    ) -> Lanes<S, V> {
+        let mut rest = argument[ORDER];
+        let mut sizes = rest.abs();
+        for k in (4..ORDER).rev() {
+            let c = self.per_force.mul_add(force[k], argument[k]);
+            rest = rest.mul_add(step_s, c);
+            sizes = sizes.mul_add(step_s, c.abs());
+        }
+        let square = step_s * step_s;
+        let [begin, linear, quadratic, cubic] = [
+            self.per_force.mul_add(force[0], argument[0]),
+            self.per_force.mul_add(force[1], argument[1]) * step_s,
+            self.per_force.mul_add(force[2], argument[2]) * square,
+            self.per_force.mul_add(force[3], argument[3]) * (square * step_s),
+        ];
+        let from_fourth = sizes * (square * square);
+        let from_cubic = from_fourth + cubic.abs();
+        let behind_linear = rest.mul_add(square * square, cubic) + quadratic;
+        let path = Path {
+            begin,
+            linear,
+            quadratic,
+            behind_begin: behind_linear + linear,
+            behind_linear,
+            from_quadratic: from_cubic + quadratic.abs(),
+            from_cubic,
+            from_fourth,
+        };
+        let above = path.room_above(self.lower);
+        let below = path.turned().room_above(-self.upper);
+        above.min(below)
+    }
+
+    /// The first instant within `most_s` at which a lane's quantity leaves its bounds, and the bound.
+    #[inline(always)]
+    pub fn first_end(
+        &self,
+        lane: usize,
+        argument: &Series<S, V>,
+        force: &Series<S, V>,
+        most_s: f64,
+    ) -> Option<(f64, f64)> {
+        let per_force = self.per_force.as_slice()[lane];
+        let mut path = [0.0; ORDER + 1];
+        for k in 0..ORDER {
+            let argument = argument[k].as_slice()[lane];
+            path[k] = per_force.mul_add(force[k].as_slice()[lane], argument);
+        }
+        path[ORDER] = argument[ORDER].as_slice()[lane];
+        let mut first: Option<(f64, f64)> = None;
+        for (bounds, sign) in [(&self.lower, 1.0), (&self.upper, -1.0)] {
+            let bound = bounds.as_slice()[lane];
+            if !bound.is_finite() {
+                continue;
+            }
+            let mut room = path;
+            room[0] -= bound;
+            for k in 0..=ORDER {
+                room[k] *= sign;
+            }
+            let until = match first {
+                Some((instant_s, _)) => instant_s,
+                None => most_s,
+            };
+            if let Some(instant_s) = first_fall(room, until) {
+                first = Some((instant_s, bound));
+            }
+        }
+        first
+    }
+}
+
+/// Terms of a polynomial at the step's end.
+struct Path<L> {
+    begin: L,
+    linear: L,
+    quadratic: L,
+    /// Its value there but for the constant term, and but for that and the linear one.
+    behind_begin: L,
+    behind_linear: L,
+    /// Sums of the absolute values of the terms of order 2, 3 and 4 and higher.
+    from_quadratic: L,
+    from_cubic: L,
+    from_fourth: L,
+}
+
+impl<S: Simd, const V: usize> Path<Lanes<S, V>> {
+    /// The negative of the polynomial.
+    #[inline(always)]
+    fn turned(&self) -> Self {
+        Self {
+            begin: -self.begin,
+            linear: -self.linear,
+            quadratic: -self.quadratic,
+            behind_begin: -self.behind_begin,
+            behind_linear: -self.behind_linear,
+            ..*self
+        }
+    }
+
+    /// Positive where the polynomial is above `bound` within the whole step, its beginning left out. A polynomial is no farther
+    /// from its chord than the sum of the terms that bend it. Three of them are tried: the polynomial itself; what is behind its
+    /// constant term, over t, for one that has just left the bound; and what is behind its linear one, over t^2, for one that
+    /// left it with no speed.
+    #[inline(always)]
+    fn room_above(&self, bound: Lanes<S, V>) -> Lanes<S, V> {
+        let zero = bound.zero();
+        let begin = self.begin - bound;
+        let chord = begin.min(begin + self.behind_begin) - self.from_quadratic;
+        let leaving = self.linear.min(self.behind_begin) - self.from_cubic;
+        let starting = self.quadratic.min(self.behind_linear) - self.from_fourth;
+        let starting = self.linear.select_less(zero, self.linear, starting);
+        begin.select_less(zero, begin, chord.max(leaving.max(starting)))
+    }
+}
+
+/// The first instant in (0, `most_s`] at which a polynomial goes from positive to negative; one that begins at zero counts from the
+/// shortest time of a mode on.
+#[inline(always)]
+fn first_fall(mut room: [f64; ORDER + 1], most_s: f64) -> Option<f64> {
+    let soon_s = SHORTEST_MODE_S.min(most_s);
+    if room[0] == 0.0 {
+        // On the bound: the root at the beginning is the last change of mode.
+        room.rotate_left(1);
+    }
+    if roots::value(&room, soon_s) < 0.0 {
+        return Some(soon_s);
+    }
+    let slope = roots::derivative(&room);
+    let mut first = None;
+    roots::roots(&room, most_s, |root_s| {
+        if root_s > soon_s && roots::value(&slope, root_s) < 0.0 {
+            first.get_or_insert(root_s);
+        }
+    });
+    first
+}
