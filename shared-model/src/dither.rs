@@ -256,10 +256,14 @@ impl<T: Real> SineMean<T> {
     /// ```
     pub fn of(&self, f: impl Fn(T) -> T, y: T, amplitude: T) -> T {
         let sum = self
-            .nodes
-            .iter()
-            .fold(T::zero(), |sum, &node| sum + f(y + amplitude * node));
+            .offsets(amplitude)
+            .fold(T::zero(), |sum, offset| sum + f(y + offset));
         sum * T::from_f64(1.0 / NODES as f64)
+    }
+
+    /// Distances from `y` at which [`of`](Self::of) takes the function, all with the same weight.
+    pub fn offsets(&self, amplitude: T) -> impl Iterator<Item = T> + '_ {
+        self.nodes.iter().map(move |&node| amplitude * node)
     }
 }
 

@@ -9,12 +9,17 @@ use serde_json::{Value, json};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;
+use shared_model::tire::TireModel;
+use shared_model::vehicle::SlipForm;
+use sim_host::engine::reference::Reference;
 use sim_host::engine::taylor::{Found, Motions, ORDER, Span, Watched};
+use sim_host::motion::Motion;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
-/// Times of the Taylor engine on jobs S, L, F and M (see benches/peers/README.md), and the share of the machine's peak.
+/// Times of the Taylor engine on jobs S, L, F and M (see benches/peers/README.md), and the share of the machine's peak. Job E is S
+/// with exact slip angles, G with the Magic Formula; the fixed step's time and error stand beside them.
 #[derive(Parser)]
 struct Arguments {
     /// Runs of each job
@@ -49,16 +54,23 @@ enum Job {
     States,
     Exponents,
     Friction,
+    ExactSlip,
+    MagicFormula,
 }
 
 impl Job {
-    const ALL: [Self; 3] = [Self::States, Self::Exponents, Self::Friction];
+    /// Those of the peers.
+    const COMMON: [Self; 3] = [Self::States, Self::Exponents, Self::Friction];
+    /// Those whose right-hand side is no polynomial.
+    const ANALYTIC: [Self; 2] = [Self::ExactSlip, Self::MagicFormula];
 
     fn name(self) -> &'static str {
         match self {
             Self::States => "S",
             Self::Exponents => "L",
             Self::Friction => "F",
+            Self::ExactSlip => "E",
+            Self::MagicFormula => "G",
         }
     }
 
@@ -68,6 +80,11 @@ impl Job {
             let mut scenario = Scenario::reconstruction();
             if self != Self::Friction {
                 scenario.friction.law = FrictionLaw::None;
+            }
+            match self {
+                Self::ExactSlip => scenario.vehicle.slip_form = SlipForm::Exact,
+                Self::MagicFormula => scenario.tires.model = TireModel::MagicFormula,
+                _ => {}
             }
             let run = &mut scenario.run;
             run.wheel_speed_rpm = 1600.0 + 10.0 * k as f64;
@@ -102,6 +119,7 @@ impl Job {
     }
 }
 
+#[derive(Clone)]
 struct Outcome {
     ends: Vec<[f64; 4]>,
     steps: usize,
@@ -121,6 +139,7 @@ impl Outcome {
 }
 
 /// A job, measured.
+#[derive(Clone)]
 struct Measured {
     job: Job,
     tolerance: f64,
@@ -132,12 +151,13 @@ struct Measured {
 fn main() {
     let arguments = Arguments::parse();
     let one = pool(1);
-    let reference = reference();
-    let measured = one.install(|| Job::ALL.map(|job| measure(job, &reference, arguments.runs)));
+    let measure = |job: Job| one.install(|| measure(job, arguments.runs));
+    let mut measured = Job::COMMON.map(measure).to_vec();
     if arguments.json {
         measured.iter().for_each(print_json);
         return;
     }
+    measured.extend(Job::ANALYTIC.map(measure));
     println!(
         "job  tolerance  error at 10 s  CPU s: median (least to greatest)     steps   changes of mode"
     );
@@ -153,7 +173,8 @@ fn main() {
             row.outcome.events
         );
     }
-    roofline(&measured, &one);
+    Job::ANALYTIC.into_iter().for_each(fixed_step);
+    roofline(&measured[..Job::COMMON.len()], &one);
     map(arguments.cells);
 }
 
@@ -175,27 +196,65 @@ fn spread(seconds: &[f64]) -> String {
     format!("{:.4} ({least:.4} to {most:.4})", sorted[sorted.len() / 2])
 }
 
-/// The states at 10 s to 18 digits and more.
-fn reference() -> Value {
+/// The states at 10 s: to 18 digits and more for the peers' jobs, by the reference integrator for the others.
+fn reference(job: Job) -> Vec<[f64; 4]> {
+    if Job::ANALYTIC.contains(&job) {
+        let end = |scenario: &Scenario<f64>| {
+            let reference = Reference::new(scenario, 1e-13);
+            let state = *reference.expect("it is valid").run(COMPARED_S);
+            state.x.into()
+        };
+        return job.scenarios().iter().map(end).collect();
+    }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../benches/peers/reference.json");
     let text = std::fs::read_to_string(&path)
         .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-    serde_json::from_str(&text).expect("the reference is JSON")
+    let all: Value = serde_json::from_str(&text).expect("the reference is JSON");
+    let states = &all["jobs"][job.name()]["states"];
+    let number = |k: usize, i: usize| {
+        let digits = states[k][i].as_str().expect("digits");
+        digits.parse().expect("a number")
+    };
+    (0..job.scenarios().len())
+        .map(|k| std::array::from_fn(|i| number(k, i)))
+        .collect()
 }
 
-fn measure(job: Job, reference: &Value, runs: usize) -> Measured {
+/// Largest distance of a component.
+fn worst(ends: &[[f64; 4]], reference: &[[f64; 4]]) -> f64 {
+    let pairs = ends.iter().flatten().zip(reference.iter().flatten());
+    pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// The same work by the ECU's fixed step, at a thousandth of a second.
+fn fixed_step(job: Job) {
+    let scenarios = job.scenarios();
+    let follow = |time_s: f64| -> Vec<[f64; 4]> {
+        let end = |scenario: &Scenario<f64>| {
+            let mut motion = Motion::new(scenario).expect("it is valid");
+            motion.observe(time_s, |_, _| {}).expect("it stays bounded");
+            motion.state().x.into()
+        };
+        scenarios.iter().map(end).collect()
+    };
+    let error = worst(&follow(COMPARED_S), &reference(job));
+    let start = cpu_s();
+    black_box(follow(TIME_S));
+    println!(
+        "{:3}  fixed step  {error:12.1e}  {:.4}",
+        job.name(),
+        cpu_s() - start
+    );
+}
+
+fn measure(job: Job, runs: usize) -> Measured {
     let motions = Motions::new(&job.scenarios()).expect("the jobs fit");
+    let reference = reference(job);
     let error_at = |tolerance: f64| {
-        let outcome = job.follow(&motions, COMPARED_S, tolerance);
-        let mut worst: f64 = 0.0;
-        for (k, end) in outcome.ends.iter().enumerate() {
-            for (i, value) in end.iter().enumerate() {
-                let digits = reference["jobs"][job.name()]["states"][k][i].as_str();
-                let exact: f64 = digits.and_then(|d| d.parse().ok()).expect("a number");
-                worst = worst.max((value - exact).abs());
-            }
-        }
-        worst
+        worst(
+            &job.follow(&motions, COMPARED_S, tolerance).ends,
+            &reference,
+        )
     };
     let kept = |tolerance: &f64| error_at(*tolerance) <= MOST_ERROR;
     let tolerance = TOLERANCES

@@ -2,7 +2,7 @@
 
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use shared_model::vehicle::{SlipForm, YAW_RATE};
+use shared_model::vehicle::YAW_RATE;
 use sim_host::chaos::attractor::{Kind, attractor};
 use sim_host::chaos::fixed_step;
 use sim_host::chaos::observe::observe;
@@ -142,7 +142,9 @@ fn results_are_in_the_scenarios_order() {
         .map(|k| {
             let mut scenario = at(1500.0 + f64::from(k), Waveform::None, 0.0);
             if k % 7 == 0 {
-                scenario.vehicle.slip_form = SlipForm::Exact;
+                scenario.dither.waveform = Waveform::Sine;
+                scenario.dither.amplitude_v = 1.0;
+                scenario.friction.dithered = true;
             }
             scenario
         })

@@ -3,6 +3,8 @@
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;
+use shared_model::tire::TireModel;
+use shared_model::vehicle::SlipForm;
 use sim_host::chaos::flow::VehicleFlow;
 use sim_host::chaos::lyapunov::exponents;
 use sim_host::engine::reference::Reference;
@@ -26,6 +28,30 @@ fn at_speed(wheel_speed_rpm: f64) -> Scenario<f64> {
     let mut scenario = Scenario::reconstruction();
     scenario.run.wheel_speed_rpm = wheel_speed_rpm;
     scenario
+}
+
+/// Exact slip angles, the Magic Formula, and both, each with every dither.
+fn analytic_scenarios() -> Vec<Scenario<f64>> {
+    let mut scenarios = Vec::new();
+    for (slip_form, tires) in [
+        (SlipForm::Exact, TireModel::Cubic),
+        (SlipForm::SmallAngle, TireModel::MagicFormula),
+        (SlipForm::Exact, TireModel::MagicFormula),
+    ] {
+        for (waveform, amplitude_v) in [
+            (Waveform::None, 0.0),
+            (Waveform::Square, 0.1),
+            (Waveform::Sine, 1.0),
+        ] {
+            let mut scenario = at_speed(1750.0);
+            scenario.vehicle.slip_form = slip_form;
+            scenario.tires.model = tires;
+            scenario.dither.waveform = waveform;
+            scenario.dither.amplitude_v = amplitude_v;
+            scenarios.push(scenario);
+        }
+    }
+    scenarios
 }
 
 /// Every friction law and dither, at speeds from rest to chaos.
@@ -64,6 +90,7 @@ fn scenarios() -> Vec<Scenario<f64>> {
     passing.run.steering_angle_rad = -0.1;
     passing.run.steering_rate_rad_per_s = 6.0;
     scenarios.push(passing);
+    scenarios.extend(analytic_scenarios());
     scenarios
 }
 
@@ -92,7 +119,8 @@ fn motions_and_events_are_the_references() {
 /// The error falls with the tolerance, down to rounding.
 #[test]
 fn the_tolerance_is_kept() {
-    let scenarios: Vec<_> = [1600.0, 1750.0, 1880.0].map(at_speed).into();
+    let mut scenarios: Vec<_> = [1600.0, 1750.0, 1880.0].map(at_speed).into();
+    scenarios.extend(analytic_scenarios());
     let ends: Vec<_> = scenarios
         .iter()
         .map(|scenario| {
@@ -162,9 +190,14 @@ fn turning_points_and_extents_are_exact() {
 /// Largest exponent and spectrum against dual numbers through the fixed step.
 #[test]
 fn exponents_are_those_of_the_fixed_step() {
-    for law in [FrictionLaw::None, FrictionLaw::CoulombRate] {
+    for (law, slip_form) in [
+        (FrictionLaw::None, SlipForm::SmallAngle),
+        (FrictionLaw::CoulombRate, SlipForm::SmallAngle),
+        (FrictionLaw::CoulombRate, SlipForm::Exact),
+    ] {
         let mut scenario = at_speed(1750.0);
         scenario.friction.law = law;
+        scenario.vehicle.slip_form = slip_form;
         let time_s = 400.0;
         let span = Span {
             warm_up_s: 0.1 * time_s,
@@ -228,8 +261,10 @@ fn the_largest_exponent_alone_and_in_the_spectrum_are_one() {
 #[test]
 fn what_does_not_fit_is_said() {
     let mut scenario = at_speed(1750.0);
-    scenario.vehicle.slip_form = shared_model::vehicle::SlipForm::Exact;
-    assert_eq!(Motions::new(&[scenario]).err(), Some(Unfit::NotPolynomial));
+    scenario.dither.waveform = Waveform::Sine;
+    scenario.dither.amplitude_v = 1.0;
+    scenario.friction.dithered = true;
+    assert_eq!(Motions::new(&[scenario]).err(), Some(Unfit::SmoothFriction));
     scenario.run.wheel_speed_rpm = f64::NAN;
     assert!(matches!(Motions::new(&[scenario]), Err(Unfit::Invalid(_))));
 }

@@ -1,5 +1,5 @@
-//! Motions that the engine cannot follow, because their right-hand side is no polynomial or slides along a step of friction: the
-//! same findings at the ECU's fixed step.
+//! Motions that the engine cannot follow, because their friction is under the mean of a sine or they slide along a step of friction:
+//! the same findings at the ECU's fixed step.
 
 use crate::chaos::extrema::Extrema;
 use crate::chaos::flow::VehicleFlow;

@@ -54,12 +54,12 @@ pub fn observe<const K: usize, R: Send>(
     Ok(results)
 }
 
-/// Whether the engine can follow the motion: its right-hand side is a polynomial between friction events, and where friction
+/// Whether the engine can follow the motion: its friction has a series between events, and where friction
 /// steps the motion can stick. Else it may slide along the step, meeting it ever more often.
 fn is_fit(scenario: &Scenario<f64>) -> Result<bool, InvalidScenario> {
     match Motions::new(std::slice::from_ref(scenario)) {
         Ok(_) => {}
-        Err(Unfit::NotPolynomial) => return Ok(false),
+        Err(Unfit::SmoothFriction) => return Ok(false),
         Err(Unfit::Invalid(error)) => return Err(error),
     }
     let motion = Motion::new(scenario)?;

@@ -1,11 +1,12 @@
 //! The steps: many motions in lanes, each with its own time.
 
-use super::expansion::{Expansion, ORDER, Series, System, value};
+use super::expansion::{Equation, Expansion, Forces};
 use super::guard::{Guards, RELEASE_MARGIN};
 use super::lanes::Lanes;
 use super::motion::{Crossing, Found, Span};
 use super::queue::{LONGEST_STEP_S, Motion, Numbers, Queue, Waiting};
 use super::roots::{self, derivative};
+use super::series::{ORDER, Series, value};
 use crate::engine::events::{Guard, next_mode};
 use crate::motion::Diverged;
 use crate::trace::BOUND;
@@ -37,7 +38,7 @@ const LOST_SQUARED: f64 = 1e-24;
 pub(super) type Result<const K: usize> = (usize, Found<K>);
 
 /// Motions on their way.
-pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize> {
+pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize, E: Equation> {
     simd: S,
     span: &'a Span,
     queue: &'a Queue<'a, K>,
@@ -52,8 +53,7 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize> {
     results: Vec<Result<K>>,
     /// Index of the friction law's argument in a state, if a mode can end at all.
     argument: Option<usize>,
-    system: System<Lanes<S, V>>,
-    expansion: Expansion<S, V, K>,
+    expansion: Expansion<S, V, K, E::Forces<S, V, K>>,
     guards: Guards<Lanes<S, V>>,
     /// The step that the tolerance allows, s.
     step_s: Lanes<S, V>,
@@ -65,7 +65,7 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize> {
     stretch: [Lanes<S, V>; K],
 }
 
-impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
+impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, K, E> {
     /// Up to `most` motions of the queue.
     pub fn new(simd: S, queue: &'a Queue<'a, K>, span: &'a Span, most: usize) -> Self {
         let mut flight = Self::empty(simd, queue, span);
@@ -77,6 +77,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
 
     fn empty(simd: S, queue: &'a Queue<'a, K>, span: &'a Span) -> Self {
         let splat = |number| Lanes::splat(simd, number);
+        let like = queue.first();
         let mut flight = Self {
             simd,
             span,
@@ -87,9 +88,8 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             aboard: 0,
             turn: 0,
             results: Vec::new(),
-            argument: queue.argument(),
-            system: System::still(simd),
-            expansion: Expansion::new(simd),
+            argument: like.argument(),
+            expansion: Expansion::new(simd, &like.model, like.injection),
             guards: Guards::none(simd),
             step_s: splat(0.0),
             left_s: splat(f64::INFINITY),
@@ -103,7 +103,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
     }
 
     /// Takes over the motions of a flight with more lanes, of which no more have one than this has lanes.
-    pub fn taking_over<const W: usize>(mut wider: Flight<'a, S, W, K>) -> Self {
+    pub fn taking_over<const W: usize>(mut wider: Flight<'a, S, W, K, E>) -> Self {
         let mut flight = Self::empty(wider.simd, wider.queue, wider.span);
         let aboard = (0..wider.lanes.len()).filter_map(|lane| wider.take(lane));
         for (lane, motion) in aboard.enumerate() {
@@ -145,7 +145,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
     #[inline(always)]
     fn step(&mut self) {
         self.steps += 1;
-        self.expansion.expand(&self.system);
+        self.expansion.expand();
         let mut step_s = self.choose_step();
         if let Some(argument) = self.argument {
             self.find_ends_of_modes(argument, &mut step_s);
@@ -165,7 +165,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         for i in 0..4 {
             self.expansion.x[i][0] = next[i];
             for k in 0..K {
-                let series = &mut self.expansion.tangents[k].x[i];
+                let series = &mut self.expansion.tangents[k][i];
                 series[0] = value(series, step_s);
             }
         }
@@ -184,7 +184,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         let splat = |number| Lanes::splat(simd, number);
         let factor = SHRINK.powi(ORDER as i32);
         let tolerance = splat(self.span.tolerance);
-        let last = greatest(&self.expansion, ORDER);
+        let last = greatest(&self.expansion.x, ORDER);
         let mut step_s = self.step_s;
         let mut error = last * power(step_s);
         for _ in 0..MOST_SHRINKS {
@@ -203,7 +203,10 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
     /// Shortens the step of lanes whose friction mode ends within it.
     #[inline(always)]
     fn find_ends_of_modes(&mut self, argument: usize, step_s: &mut Lanes<S, V>) {
-        let (x, force) = (&self.expansion.x[argument], self.expansion.front_force());
+        let (x, force) = (
+            &self.expansion.x[argument],
+            self.expansion.forces.front_force(),
+        );
         let room = self.guards.room(x, force, *step_s);
         if room.zero().all_less(room) {
             return;
@@ -351,8 +354,8 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             _ => (after[STEERING_RATE] - before[STEERING_RATE]) / before[argument],
         };
         for tangent in &mut self.expansion.tangents {
-            let along = tangent.x[argument][0].as_slice()[lane];
-            let rate = &mut tangent.x[STEERING_RATE][0].as_mut_slice()[lane];
+            let along = tangent[argument][0].as_slice()[lane];
+            let rate = &mut tangent[STEERING_RATE][0].as_mut_slice()[lane];
             *rate = match to {
                 FrictionMode::Sticking => 0.0,
                 _ => jump.mul_add(along, *rate),
@@ -370,9 +373,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             return;
         };
         let (model, injection) = (&motion.task.model, motion.task.injection);
-        let system = System::new(model, injection, motion.mode);
-        self.system
-            .set_lane(lane, system.expect("every task was checked"));
+        self.expansion.set_mode(lane, model, motion.mode);
         self.guards.set_lane(lane, model, injection, motion.mode);
     }
 
@@ -383,7 +384,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             return;
         }
         if K == 1 {
-            let vector = coefficients(&self.expansion.tangents[0].x, 0);
+            let vector = coefficients(&self.expansion.tangents[0], 0);
             let square = dot(&vector, &vector);
             let (least, most) = LENGTHS_SQUARED;
             let simd = self.simd;
@@ -420,7 +421,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         let tangents = &mut self.expansion.tangents;
         let mut units = [[splat(0.0); 4]; K];
         for k in 0..K {
-            let mut vector = coefficients(&tangents[k].x, 0);
+            let mut vector = coefficients(&tangents[k], 0);
             let before = dot(&vector, &vector);
             for j in 0..k {
                 let share = -dot(&vector, &units[j]);
@@ -435,7 +436,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             self.stretch[k] = self.stretch[k] * length;
             for i in 0..4 {
                 units[k][i] = vector[i] * inverse;
-                tangents[k].x[i][0] = units[k][i];
+                tangents[k][i][0] = units[k][i];
             }
         }
     }
@@ -447,7 +448,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             return;
         };
         if K == 1 {
-            let x = &mut self.expansion.tangents[0].x;
+            let x = &mut self.expansion.tangents[0];
             let square: f64 = x.iter().map(|x| x[0].as_slice()[lane].powi(2)).sum();
             let length = square.sqrt();
             motion.growth[0] += length.ln();
@@ -468,7 +469,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
     fn end_what_has_ended(&mut self) {
         let simd = self.simd;
         let splat = |number| Lanes::splat(simd, number);
-        let room = splat(BOUND) - greatest(&self.expansion, 0);
+        let room = splat(BOUND) - greatest(&self.expansion.x, 0);
         if splat(0.0).all_less(self.left_s.min(room)) {
             return;
         }
@@ -541,6 +542,8 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
 
     fn load(&mut self, lane: usize, (mut motion, numbers): Waiting<'a, K>) {
         self.set_numbers(lane, &numbers);
+        let (model, injection) = (&motion.task.model, motion.task.injection);
+        self.expansion.set_lane(lane, model, injection);
         motion.boarded = self.steps;
         self.lanes[lane] = Some(motion);
         self.aboard += 1;
@@ -555,14 +558,14 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
             x: self.state(lane),
             tangents: self.expansion.tangents.each_ref().map(|tangent| {
                 let coefficient = |x: &Series<S, V>| x[0].as_slice()[lane];
-                tangent.x.each_ref().map(coefficient)
+                tangent.each_ref().map(coefficient)
             }),
             stretch: self.stretch.map(|stretch| stretch.as_slice()[lane]),
             step_s: self.step_s.as_slice()[lane],
             left_s: self.left_s.as_slice()[lane],
         };
         self.aboard -= 1;
-        self.system.set_lane(lane, System::STILL);
+        self.expansion.free_lane(lane);
         self.guards.free_lane(lane);
         Some((motion, numbers))
     }
@@ -571,7 +574,7 @@ impl<'a, S: Simd, const V: usize, const K: usize> Flight<'a, S, V, K> {
         for i in 0..4 {
             self.expansion.x[i][0].as_mut_slice()[lane] = numbers.x[i];
             for k in 0..K {
-                let component = &mut self.expansion.tangents[k].x[i][0];
+                let component = &mut self.expansion.tangents[k][i][0];
                 component.as_mut_slice()[lane] = numbers.tangents[k][i];
             }
         }
@@ -614,11 +617,8 @@ fn coefficients<S: Simd, const V: usize>(x: &[Series<S, V>; 4], n: usize) -> [La
 
 /// Greatest absolute value of coefficient `n`.
 #[inline(always)]
-fn greatest<S: Simd, const V: usize, const K: usize>(
-    expansion: &Expansion<S, V, K>,
-    n: usize,
-) -> Lanes<S, V> {
-    let [a, b, c, d] = coefficients(&expansion.x, n);
+fn greatest<S: Simd, const V: usize>(x: &[Series<S, V>; 4], n: usize) -> Lanes<S, V> {
+    let [a, b, c, d] = coefficients(x, n);
     a.abs().max(b.abs()).max(c.abs().max(d.abs()))
 }
 

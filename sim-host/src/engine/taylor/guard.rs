@@ -1,8 +1,8 @@
 //! Where friction modes end: a quantity of each lane that must stay within bounds, on the step's polynomials.
 
-use super::expansion::{ORDER, Series};
 use super::lanes::Lanes;
 use super::roots;
+use super::series::{ORDER, Series};
 use crate::engine::events::Guard;
 use pulp::Simd;
 use shared_model::dither::Injection;

@@ -34,6 +34,22 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
         Self::splat(self.simd, 0.0)
     }
 
+    /// One in all lanes.
+    #[inline(always)]
+    pub fn one(self) -> Self {
+        Self::splat(self.simd, 1.0)
+    }
+
+    /// A function of each lane, one after the other.
+    #[inline(always)]
+    pub fn each(self, function: fn(f64) -> f64) -> Self {
+        let mut result = self;
+        for lane in result.as_mut_slice() {
+            *lane = function(*lane);
+        }
+        result
+    }
+
     /// The lanes as a slice.
     #[inline(always)]
     pub fn as_slice(&self) -> &[f64] {

@@ -9,13 +9,17 @@
 // An iterator's closures are not always inlined, and then not compiled for the instruction set: see `lanes`.
 #![allow(clippy::needless_range_loop)]
 
+mod analytic;
 mod expansion;
 mod flight;
 mod guard;
 mod lanes;
 mod motion;
+mod polynomial;
 mod queue;
 mod roots;
+mod series;
+mod tires;
 
-pub use expansion::ORDER;
 pub use motion::{Crossing, Found, Growths, Motions, Span, Unfit, Watched};
+pub use series::ORDER;

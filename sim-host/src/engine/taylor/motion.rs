@@ -1,15 +1,19 @@
 //! What is asked of the engine, and what it finds.
 
-use super::expansion::System;
+use super::analytic::Analytic;
+use super::expansion::Equation;
 use super::flight::{self, Flight};
+use super::polynomial::Polynomial;
 use super::queue::Queue;
+use super::tires::offsets;
 use crate::motion::Diverged;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use shared_model::dither::{Application, Injection};
-use shared_model::friction::{FrictionMode, Sign};
-use shared_model::vehicle::{Model, State};
+use shared_model::friction::Sign;
+use shared_model::vehicle::{Model, SlipForm, State};
 use shared_model::{InvalidScenario, Scenario};
+use std::marker::PhantomData;
 
 /// Vectors side by side: enough to hide the latency of a multiplication.
 const VECTORS: usize = 2;
@@ -116,11 +120,9 @@ pub enum Unfit {
     /// Its scenario is not valid.
     #[error(transparent)]
     Invalid(#[from] InvalidScenario),
-    /// Its right-hand side is not a polynomial.
-    #[error(
-        "the engine follows the cubic tyre at small slip angles, its friction not under the mean of a sine"
-    )]
-    NotPolynomial,
+    /// Its friction is smooth, but has no series where the sine ends.
+    #[error("the engine does not follow friction under the mean of a sine")]
+    SmoothFriction,
 }
 
 /// A motion to be followed.
@@ -141,12 +143,21 @@ impl Task {
         let injection = averaged.dither.injection(0.0);
         let mut start = model.initial_state(&averaged);
         start.friction = model.mode_at(&start.x, injection);
-        System::new(&model, injection, FrictionMode::Neutral).ok_or(Unfit::NotPolynomial)?;
+        if let Sign::Smooth { .. } = model.friction_sign(injection) {
+            return Err(Unfit::SmoothFriction);
+        }
         Ok(Self {
             model,
             injection,
             start,
         })
+    }
+
+    /// What all motions of a flight have in common: form of the slip angles, slip angles at which the Magic Formula is worked out (none
+    /// for cubic tyres), and the friction law's argument.
+    fn form(&self) -> (SlipForm, usize, Option<usize>) {
+        let probes = offsets(self.model.tires().0, self.injection).len();
+        (self.model.constants().slip_form, probes, self.argument())
     }
 
     /// Index in the state of the friction law's argument, if friction has modes.
@@ -182,9 +193,12 @@ impl Motions {
 
     /// The same with a given instruction set.
     fn follow_by<const K: usize>(&self, arch: Arch, span: &Span) -> Vec<Found<K>> {
-        // A flight watches one argument of the friction law.
-        let alike = self.tasks.chunk_by(|a, b| a.argument() == b.argument());
-        alike.flat_map(|tasks| follow(arch, tasks, span)).collect()
+        let alike = self.tasks.chunk_by(|a, b| a.form() == b.form());
+        let follow = |tasks: &[Task]| match tasks[0].form() {
+            (SlipForm::SmallAngle, 0, _) => follow::<Polynomial, K>(arch, tasks, span),
+            _ => follow::<Analytic, K>(arch, tasks, span),
+        };
+        alike.flat_map(follow).collect()
     }
 
     /// Goes on from where the motions were found to end.
@@ -196,35 +210,43 @@ impl Motions {
 }
 
 /// Follows tasks that are alike, each thread as many side by side as it has lanes.
-fn follow<const K: usize>(arch: Arch, tasks: &[Task], span: &Span) -> Vec<Found<K>> {
+fn follow<E: Equation, const K: usize>(arch: Arch, tasks: &[Task], span: &Span) -> Vec<Found<K>> {
     let queue = &Queue::new(tasks, span.ends_s()[0]);
     let threads = rayon::current_num_threads();
     let most = tasks.len().div_ceil(threads);
     let flights = (0..threads).into_par_iter();
     let mut results: Vec<_> = flights
-        .flat_map_iter(|_| arch.dispatch(Fly { queue, span, most }))
+        .flat_map_iter(|_| {
+            arch.dispatch(Fly::<E, K> {
+                queue,
+                span,
+                most,
+                equation: PhantomData,
+            })
+        })
         .collect();
     results.sort_unstable_by_key(|&(index, _)| index);
     results.into_iter().map(|(_, found)| found).collect()
 }
 
 /// One thread's share.
-struct Fly<'a, const K: usize> {
+struct Fly<'a, E, const K: usize> {
     queue: &'a Queue<'a, K>,
     span: &'a Span,
     most: usize,
+    equation: PhantomData<E>,
 }
 
-impl<const K: usize> WithSimd for Fly<'_, K> {
+impl<E: Equation, const K: usize> WithSimd for Fly<'_, E, K> {
     type Output = Vec<flight::Result<K>>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { queue, span, most } = self;
-        let mut flight = Flight::<S, VECTORS, K>::new(simd, queue, span, most);
+        let (queue, span, most) = (self.queue, self.span, self.most);
+        let mut flight = Flight::<S, VECTORS, K, E>::new(simd, queue, span, most);
         flight.run(S::F64_LANES);
         // The last ones fit into one vector.
-        let mut last = Flight::<S, 1, K>::taking_over(flight);
+        let mut last = Flight::<S, 1, K, E>::taking_over(flight);
         last.run(0);
         last.results()
     }
@@ -235,8 +257,9 @@ mod tests {
     use super::*;
     use pulp::x86::{V3, V4};
     use shared_model::dither::Waveform;
+    use shared_model::tire::TireModel;
 
-    /// Motions of all kinds: chaos, a period, stick, rest, and one that diverges.
+    /// Motions of all kinds: chaos, a period, stick, rest, and one that diverges; and of both kinds of right-hand side.
     fn scenarios() -> Vec<Scenario<f64>> {
         let scenario = |k: usize| {
             let mut scenario = Scenario::reconstruction();
@@ -246,13 +269,18 @@ mod tests {
                 scenario.dither.waveform = Waveform::Square;
                 scenario.dither.amplitude_v = 0.1;
             }
+            if k > 20 {
+                scenario.vehicle.slip_form = SlipForm::Exact;
+                scenario.tires.model = TireModel::MagicFormula;
+                scenario.run.wheel_speed_rpm = 1700.0;
+            }
             if k == 7 {
                 (scenario.tires.front, scenario.tires.rear) =
                     shared_model::tire::HIGH_FRICTION_ROAD;
             }
             scenario
         };
-        (0..21).map(scenario).collect()
+        (0..40).map(scenario).collect()
     }
 
     fn span() -> Span {

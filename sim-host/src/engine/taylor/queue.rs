@@ -105,7 +105,7 @@ struct Ends<'a, const K: usize> {
 }
 
 impl<'a, const K: usize> Queue<'a, K> {
-    /// All tasks, in their order.
+    /// All tasks, at least one, in their order.
     pub fn new(tasks: &'a [Task], first_s: f64) -> Self {
         let (next, paused) = (0, VecDeque::new());
         let waiting = Mutex::new(Ends { next, paused });
@@ -116,9 +116,9 @@ impl<'a, const K: usize> Queue<'a, K> {
         }
     }
 
-    /// Index in the state of the friction law's argument, if friction has modes: the same for all tasks.
-    pub fn argument(&self) -> Option<usize> {
-        self.tasks.first().and_then(Task::argument)
+    /// The first task; the others are like it.
+    pub fn first(&self) -> &'a Task {
+        &self.tasks[0]
     }
 
     /// How many motions wait.

@@ -1,6 +1,6 @@
 //! Roots of a step's polynomial, to machine precision.
 
-use super::expansion::ORDER;
+use super::series::ORDER;
 
 /// Width, as a share of the step, at which an interval with several roots counts as one: a root of higher order.
 const NARROWEST: f64 = 1e-12;
