@@ -146,7 +146,11 @@ fn bad_input_is_refused() {
         ("--out o.csv --time nan", &["NaN s"]),
         (
             "--out o.csv --preset printed",
-            &["cubic tyre at small slip angles"],
+            &["friction", "under the mean of a sine", "slide"],
+        ),
+        (
+            "--out o.csv --preset printed --dither square",
+            &["friction", "slide"],
         ),
         ("", &["--out, --parquet, --figure or --work"]),
     ] {

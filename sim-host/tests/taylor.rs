@@ -240,6 +240,40 @@ fn exponents_are_those_of_the_fixed_step() {
     }
 }
 
+/// What the first tangent vector has grown by at turning points of the yaw rate is what it would have grown by if the motion ended
+/// there.
+#[test]
+fn growth_at_turns_is_that_of_shorter_motions() {
+    let scenario = at_speed(1750.0);
+    let motions = Motions::new(&[scenario]).expect("it fits");
+    let mut watched = Watched::default();
+    watched.turns[1] = true;
+    let turning = Span {
+        watched,
+        warm_up_s: 1.0,
+        pieces: 8,
+        ..span(9.0)
+    };
+    let growth_until = |time_s: f64| -> f64 {
+        let whole = Span {
+            pieces: 1,
+            ..span(time_s)
+        };
+        motions.follow::<1>(&whole)[0].growths[0][0]
+    };
+    let (one, all) = (motions.follow::<1>(&turning), motions.follow::<4>(&turning));
+    // Before counting begins the vector is not of length one.
+    let begin = 0.5 * (1.5_f64.powi(2) + 3.0 * 0.5_f64.powi(2)).ln();
+    let turns = &one[0].turns[1];
+    assert!(turns.len() > 8 && one[0].growth_at_turns.len() == turns.len());
+    for (k, &(time_s, _)) in turns.iter().enumerate() {
+        let wanted = growth_until(time_s) + begin;
+        let (one, all) = (one[0].growth_at_turns[k], all[0].growth_at_turns[k]);
+        assert!((one - wanted).abs() < 1e-6, "{one} {wanted} at {time_s} s");
+        assert!((all - wanted).abs() < 1e-6, "{all} {wanted} at {time_s} s");
+    }
+}
+
 /// Without friction the sum of all exponents is the mean of the divergence, which the frame's volume must follow exactly.
 #[test]
 fn the_largest_exponent_alone_and_in_the_spectrum_are_one() {

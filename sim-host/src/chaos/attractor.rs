@@ -1,7 +1,7 @@
 //! What a motion ends on, and whether two motions end on the same.
 
 use crate::chaos::equilibria::Equilibrium;
-use crate::chaos::lyapunov::{Exponent, Pieces};
+use crate::chaos::lyapunov::{Exponent, largest_of};
 use crate::chaos::observe::observe;
 use crate::chaos::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
 use crate::chaos::sweep::{Timing, Watch};
@@ -109,8 +109,7 @@ impl Attractor {
         let range = found.upper[YAW_RATE] - found.lower[YAW_RATE];
         let maxima = maxima_of_turns(&found.turns[YAW_RATE], range);
         let period = period_of_maxima(&maxima, range, TOLERANCE);
-        let spectrum = Pieces::of(found, timing.observed_s).spectrum();
-        let largest = spectrum.first().copied().flatten();
+        let largest = largest_of(found, &maxima, timing.observed_s);
         let exponent = largest.filter(|_| period != Period::Equilibrium);
         let (residual, cycle_s) = match period {
             Period::Periodic {

@@ -14,7 +14,7 @@ use crate::trace::Trace;
 use nalgebra::{SMatrix, SVector, Vector4};
 use shared_model::Scenario;
 use shared_model::open_loop::OpenLoop;
-use shared_model::vehicle::State;
+use shared_model::vehicle::{State, YAW_RATE};
 
 /// Fewest pieces for a standard error.
 const MIN_PIECES: usize = 16;
@@ -71,6 +71,34 @@ impl Exponent {
     pub fn is_positive(&self) -> bool {
         self.per_s > self.threshold_per_s()
     }
+}
+
+/// Largest exponent of a motion that was found over `time_s`, given the maxima of its yaw rate (time in s, and height). `None` if it
+/// is not finite.
+///
+/// The motion is cut at the maxima, as in [`largest`]; where they are too few, or the growth is not known there, into pieces of equal
+/// time.
+pub(crate) fn largest_of<const K: usize>(
+    found: &Found<K>,
+    maxima: &[(f64, f64)],
+    time_s: f64,
+) -> Option<Exponent> {
+    let growth_at = |time_s: f64| {
+        let turns = &found.turns[YAW_RATE];
+        let turn = turns.binary_search_by(|turn| turn.0.total_cmp(&time_s));
+        found.growth_at_turns.get(turn.ok()?).copied()
+    };
+    let cut = |&(time_s, _): &(f64, f64)| Some((growth_at(time_s)?, time_s));
+    let behind = maxima.iter().filter(|turn| turn.0 > WARM_UP * time_s);
+    let cuts: Vec<_> = behind.filter_map(cut).collect();
+    if cuts.len() <= MIN_PIECES {
+        let spectrum = Pieces::of(found, time_s).spectrum();
+        return spectrum.first().copied().flatten();
+    }
+    let piece = |ends: &[(f64, f64)]| (ends[1].0 - ends[0].0, ends[1].1 - ends[0].1);
+    let pieces: Vec<_> = cuts.windows(2).map(piece).collect();
+    let exponent = Exponent::from_pieces(&pieces);
+    exponent.per_s.is_finite().then_some(exponent)
 }
 
 /// Variance of the sum of a correlated sequence of mean zero: prewhitened by a first-order autoregression, then with

@@ -56,7 +56,7 @@ pub fn observe<const K: usize, R: Send>(
 
 /// Whether the engine can follow the motion: its friction has a series between events, and where friction
 /// steps the motion can stick. Else it may slide along the step, meeting it ever more often.
-fn is_fit(scenario: &Scenario<f64>) -> Result<bool, InvalidScenario> {
+pub(crate) fn is_fit(scenario: &Scenario<f64>) -> Result<bool, InvalidScenario> {
     match Motions::new(std::slice::from_ref(scenario)) {
         Ok(_) => {}
         Err(Unfit::SmoothFriction) => return Ok(false),

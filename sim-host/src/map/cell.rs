@@ -2,9 +2,9 @@
 
 use super::plan::{Place, Plan, Start};
 use crate::chaos::attractor::{self, kind};
-use crate::chaos::lyapunov::{Exponent, PIECES, WARM_UP};
+use crate::chaos::lyapunov::{PIECES, WARM_UP, largest_of};
 use crate::chaos::period::{PROMINENCE, Period, TOLERANCE, period_of_maxima, prominent_maxima};
-use crate::engine::taylor::{Found, Growths, Motions, Span, Unfit, Watched};
+use crate::engine::taylor::{Found, Motions, Span, Unfit, Watched};
 use serde::{Deserialize, Serialize};
 use shared_model::dither::Waveform;
 use shared_model::vehicle::{STEERING_ANGLE, State, YAW_RATE};
@@ -136,7 +136,7 @@ fn staying(place: &Place, plan: &Plan, begin: &State<f64>, found: &Found<1>) -> 
     let range = |component: usize| found.upper[component] - found.lower[component];
     let maxima = yaw_rate_maxima(begin, found, plan.observed_s);
     let period = period_of_maxima(&maxima, range(YAW_RATE), TOLERANCE);
-    let exponent = exponent(&found.growths, (1.0 - WARM_UP) * plan.observed_s);
+    let exponent = largest_of(found, &maxima, plan.observed_s);
     let kind = kind(period, exponent, true, &maxima);
     Cell {
         kind: kind.into(),
@@ -169,12 +169,4 @@ fn yaw_rate_maxima(begin: &State<f64>, found: &Found<1>, time_s: f64) -> Vec<(f6
     let range = found.upper[YAW_RATE] - found.lower[YAW_RATE];
     let maxima = prominent_maxima(&heights, PROMINENCE * range);
     maxima.into_iter().map(|k| turns[k]).collect()
-}
-
-/// The exponent from pieces of equal time, `time_s` together; none where the tangent vector has no length left.
-fn exponent(growths: &[Growths<1>], time_s: f64) -> Option<Exponent> {
-    let piece_s = time_s / growths.len() as f64;
-    let pieces: Vec<_> = growths.iter().map(|&[growth]| (growth, piece_s)).collect();
-    let exponent = Exponent::from_pieces(&pieces);
-    exponent.per_s.is_finite().then_some(exponent)
 }

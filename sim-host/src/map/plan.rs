@@ -1,10 +1,10 @@
 //! Which cells a map has, and the motion of each.
 
+use crate::chaos::observe::is_fit;
 use crate::chaos::sweep::{SweepError, Timing, Values, mirrored};
-use crate::engine::taylor::{Motions, Unfit};
 use serde::{Deserialize, Serialize};
-use shared_model::Scenario;
 use shared_model::dither::Waveform;
+use shared_model::{InvalidScenario, Scenario};
 
 /// Cells of a tile: so many that no lane of the engine waits long for another.
 pub const CELLS_A_TILE: usize = 128;
@@ -108,9 +108,15 @@ pub enum PlanError {
         /// Its cells.
         cells: usize,
     },
-    /// The engine cannot follow the motions.
+    /// A cell's scenario is not valid.
     #[error(transparent)]
-    Unfit(#[from] Unfit),
+    Scenario(#[from] InvalidScenario),
+    /// The engine cannot follow the motions.
+    #[error(
+        "the map cannot follow this friction: it is under the mean of a sine, or the motion may slide along a step of it; \
+         choose another law or leave it undithered"
+    )]
+    Friction,
 }
 
 impl Plan {
@@ -140,7 +146,11 @@ impl Plan {
         if cells == 0 || cells > MOST_CELLS {
             return Err(PlanError::Size { cells });
         }
-        Motions::new(&plan.corners())?;
+        for corner in plan.corners() {
+            if !is_fit(&corner)? {
+                return Err(PlanError::Friction);
+            }
+        }
         Ok(plan)
     }
 

@@ -5,7 +5,7 @@ use super::guard::{Guards, RELEASE_MARGIN};
 use super::lanes::Lanes;
 use super::motion::{Crossing, Found, Span};
 use super::queue::{LONGEST_STEP_S, Motion, Numbers, Queue, Waiting};
-use super::roots::{self, derivative};
+use super::roots::{self, Polynomial, derivative};
 use super::series::{ORDER, Series, value};
 use crate::engine::events::{Guard, next_mode};
 use crate::motion::Diverged;
@@ -13,7 +13,7 @@ use crate::trace::BOUND;
 use nalgebra::Vector4;
 use pulp::Simd;
 use shared_model::friction::FrictionMode;
-use shared_model::vehicle::{STEERING_RATE, State};
+use shared_model::vehicle::{STEERING_RATE, State, YAW_RATE};
 
 /// A motion that needs a step shorter than this leaves all bounds, s.
 const SHORTEST_STEP_S: f64 = 1e-9;
@@ -243,15 +243,27 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             }
             let most_s = step_s.as_slice()[lane];
             let begin_s = self.time_s(lane);
-            let series = self.expansion.x[component].each_ref();
-            let polynomial = series.map(|c| c.as_slice()[lane]);
-            let Some(lane) = &mut self.lanes[lane] else {
+            let polynomial = polynomial(&self.expansion.x[component], lane);
+            let tangent = match component {
+                YAW_RATE => self.expansion.tangents.first(),
+                _ => None,
+            };
+            let stretch = match self.stretch.first() {
+                Some(stretch) => stretch.as_slice()[lane],
+                None => 1.0,
+            };
+            let Some(motion) = &mut self.lanes[lane] else {
                 continue;
             };
             roots::roots(&derivative(&polynomial), most_s, |root_s| {
                 let turn = roots::value(&polynomial, root_s);
-                lane.found.turns[component].push((begin_s + root_s, turn));
-                lane.found.extend(component, turn);
+                motion.found.turns[component].push((begin_s + root_s, turn));
+                motion.found.extend(component, turn);
+                if let Some(tangent) = tangent {
+                    let growth =
+                        motion.growth_before + stretch.ln() + log_length(tangent, lane, root_s);
+                    motion.found.growth_at_turns.push(growth);
+                }
             });
         }
     }
@@ -452,11 +464,13 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             let square: f64 = x.iter().map(|x| x[0].as_slice()[lane].powi(2)).sum();
             let length = square.sqrt();
             motion.growth[0] += length.ln();
+            motion.growth_before += length.ln();
             for x in x {
                 x[0].as_mut_slice()[lane] /= length;
             }
             return;
         }
+        motion.growth_before += self.stretch[0].as_slice()[lane].ln();
         for (growth, stretch) in motion.growth.iter_mut().zip(&mut self.stretch) {
             let stretch = &mut stretch.as_mut_slice()[lane];
             *growth += stretch.ln();
@@ -584,6 +598,26 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         self.step_s.as_mut_slice()[lane] = numbers.step_s;
         self.left_s.as_mut_slice()[lane] = numbers.left_s;
     }
+}
+
+/// The polynomial of one lane.
+#[inline(always)]
+fn polynomial<S: Simd, const V: usize>(series: &Series<S, V>, lane: usize) -> Polynomial {
+    let mut polynomial = [0.0; ORDER + 1];
+    for k in 0..=ORDER {
+        polynomial[k] = series[k].as_slice()[lane];
+    }
+    polynomial
+}
+
+/// Logarithm of the length of one lane's tangent vector, `t` from the step's beginning.
+#[inline(always)]
+fn log_length<S: Simd, const V: usize>(tangent: &[Series<S, V>; 4], lane: usize, t: f64) -> f64 {
+    let mut square = 0.0;
+    for series in tangent {
+        square += roots::value(&polynomial(series, lane), t).powi(2);
+    }
+    0.5 * square.ln()
 }
 
 /// Bound on how far a polynomial is from its chord within (0, `t`).

@@ -86,6 +86,8 @@ pub struct Found<const K: usize> {
     pub upper: [f64; 4],
     /// Growth of the tangent vectors, piece by piece.
     pub growths: Vec<Growths<K>>,
+    /// Growth of the first tangent vector since the start, a logarithm, at each turning point of the yaw rate, if that is watched.
+    pub growth_at_turns: Vec<f64>,
     /// Changes of friction mode.
     pub events: usize,
     /// Steps.
@@ -103,6 +105,7 @@ impl<const K: usize> Found<K> {
             lower: start.x.into(),
             upper: start.x.into(),
             growths: Vec::new(),
+            growth_at_turns: Vec::new(),
             events: 0,
             steps: 0,
         }

@@ -23,6 +23,8 @@ pub(super) struct Motion<'a, const K: usize> {
     pub piece: usize,
     /// Logarithms of the tangent vectors' growth since the piece began.
     pub growth: [f64; K],
+    /// That of the first since the start, as far as it has been counted.
+    pub growth_before: f64,
     pub found: Found<K>,
 }
 
@@ -36,6 +38,7 @@ impl<'a, const K: usize> Motion<'a, K> {
             short_modes: 0,
             piece: 0,
             growth: [0.0; K],
+            growth_before: 0.0,
             found: Found::at(&task.start),
         }
     }
