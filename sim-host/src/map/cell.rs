@@ -3,14 +3,15 @@
 use super::plan::{Place, Plan, Start};
 use crate::chaos::attractor::{self, kind};
 use crate::chaos::lyapunov::{Exponent, PIECES, WARM_UP};
-use crate::chaos::period::{PROMINENCE, Period, TOLERANCE, period_of_maxima, prominent_maxima};
+use crate::chaos::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
 use crate::engine::taylor::{Found, Growths, Motions, Span, Unfit, Watched};
 use serde::{Deserialize, Serialize};
 use shared_model::dither::Waveform;
-use shared_model::vehicle::{STEERING_ANGLE, State, YAW_RATE};
+use shared_model::vehicle::{STEERING_ANGLE, YAW_RATE};
 
-/// Largest last term of a step's expansion, in rad and rad/s.
-const TOLERANCE_OF_STEP: f64 = 1e-12;
+/// Largest last term of a step's expansion, in rad and rad/s: that of the other analyses, so that a cell shows the very motion that
+/// they find there. Where a chaotic transient ends by chance, another tolerance would end it elsewhere.
+const TOLERANCE_OF_STEP: f64 = 1e-10;
 
 /// The kind of a motion, as [`attractor::Kind`] without its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,7 +54,7 @@ pub struct Cell {
     pub dither_amplitude_v: f64,
     /// Kind of the motion.
     pub kind: Kind,
-    /// Maxima of the yaw rate in a cycle; 0 at rest, none without a cycle.
+    /// Maxima of the yaw rate in a cycle, whatever the exponent says; 0 at rest, none without a cycle.
     pub period: Option<u32>,
     /// Bands that the maxima of a chaotic motion visit in turn.
     pub bands: Option<u32>,
@@ -69,6 +70,18 @@ pub struct Cell {
     pub steering_angle_peak_to_peak_rad: Option<f64>,
     /// When the motion left all bounds, s from the start.
     pub diverges_at_s: Option<f64>,
+}
+
+impl Cell {
+    /// Where it lies.
+    pub fn place(&self) -> Place {
+        Place {
+            waveform: self.waveform,
+            start: self.start,
+            wheel_speed_rpm: self.wheel_speed_rpm,
+            dither_amplitude_v: self.dither_amplitude_v,
+        }
+    }
 }
 
 /// The cells at some places of a plan.
@@ -108,7 +121,7 @@ pub fn cells(plan: &Plan, places: &[Place]) -> Result<Vec<Cell>, Unfit> {
         };
         match diverges_at_s {
             Some(time_s) => diverging(place, time_s),
-            None => staying(place, plan, &settled.end, found),
+            None => staying(place, plan, found),
         }
     };
     Ok(places.iter().zip(&settled).zip(&found).map(cell).collect())
@@ -132,9 +145,9 @@ fn diverging(place: &Place, time_s: f64) -> Cell {
     }
 }
 
-fn staying(place: &Place, plan: &Plan, begin: &State<f64>, found: &Found<1>) -> Cell {
+fn staying(place: &Place, plan: &Plan, found: &Found<1>) -> Cell {
     let range = |component: usize| found.upper[component] - found.lower[component];
-    let maxima = yaw_rate_maxima(begin, found, plan.observed_s);
+    let maxima = maxima_of_turns(&found.turns[YAW_RATE], range(YAW_RATE));
     let period = period_of_maxima(&maxima, range(YAW_RATE), TOLERANCE);
     let exponent = exponent(&found.growths, (1.0 - WARM_UP) * plan.observed_s);
     let kind = kind(period, exponent, true, &maxima);
@@ -158,17 +171,6 @@ fn staying(place: &Place, plan: &Plan, begin: &State<f64>, found: &Found<1>) -> 
         diverges_at_s: None,
         ..diverging(place, 0.0)
     }
-}
-
-/// Time (s) and height (rad/s) of the maxima that stand out by a hundredth of the range.
-fn yaw_rate_maxima(begin: &State<f64>, found: &Found<1>, time_s: f64) -> Vec<(f64, f64)> {
-    let mut turns = vec![(0.0, begin.x[YAW_RATE])];
-    turns.extend(&found.turns[YAW_RATE]);
-    turns.push((time_s, found.end.x[YAW_RATE]));
-    let heights: Vec<f64> = turns.iter().map(|turn| turn.1).collect();
-    let range = found.upper[YAW_RATE] - found.lower[YAW_RATE];
-    let maxima = prominent_maxima(&heights, PROMINENCE * range);
-    maxima.into_iter().map(|k| turns[k]).collect()
 }
 
 /// The exponent from pieces of equal time, `time_s` together; none where the tangent vector has no length left.
