@@ -1,6 +1,5 @@
 //! What is shown of the firmware's images: worst stack, size, instructions of the tasks, spacing of interrupts.
 
-use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::tire::TireModel;
