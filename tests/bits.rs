@@ -9,21 +9,7 @@ use sim_host::equivalence::bits;
 use sim_host::pil::qemu::Machine;
 use sim_host::simulate::simulate;
 use sim_host::trace::Trace;
-use tests::record;
-
-/// A short run with the dither from its first quarter on.
-fn scenario(waveform: Waveform, application: Application) -> Scenario<f32> {
-    let mut scenario = Scenario::reconstruction();
-    scenario.run.duration_s = 2.0;
-    scenario.dither.start_time_s = 0.5;
-    scenario.dither.waveform = waveform;
-    scenario.dither.application = application;
-    scenario.dither.amplitude_v = match waveform {
-        Waveform::Sine => 1.0,
-        _ => 0.1,
-    };
-    scenario
-}
+use tests::{record, scenario};
 
 fn assert_same_bits(scenario: &Scenario<f32>, machine: Machine) {
     let firmware = record(scenario, machine, 0).trace();

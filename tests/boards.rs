@@ -1,7 +1,7 @@
 //! The same ECU on other boards: an STM32F405 whose timer is looked at from outside, and the images of all boards.
 
 use shared_model::Scenario;
-use shared_model::dither::Waveform;
+use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::open_loop::OpenLoop;
 use sim_host::equivalence::bits;
@@ -33,15 +33,8 @@ const ARR: u32 = TIM3 + 0x2C;
 const CCR1: u32 = TIM3 + 0x34;
 
 fn scenario(waveform: Waveform) -> Scenario<f32> {
-    let mut scenario = Scenario::reconstruction();
+    let mut scenario = tests::scenario(waveform, Application::Averaged);
     scenario.servo.timer_clock_hz = STM32F405_TIMER_HZ;
-    scenario.run.duration_s = 2.0;
-    scenario.dither.start_time_s = 0.5;
-    scenario.dither.waveform = waveform;
-    scenario.dither.amplitude_v = match waveform {
-        Waveform::Sine => 1.0,
-        _ => 0.1,
-    };
     scenario
 }
 

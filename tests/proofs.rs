@@ -1,6 +1,5 @@
 //! What is shown of the firmware's images: worst stack, size, instructions of the tasks, spacing of interrupts.
 
-use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::tire::TireModel;
@@ -16,7 +15,7 @@ use sim_host::pil::qemu::Machine;
 use sim_host::pil::session::LinkKind;
 use std::fs;
 use tests::golden::{Figure, check_figures};
-use tests::{TIME_OUT, board_image, framed_image, image, record, root};
+use tests::{TIME_OUT, board_image, framed_image, image, record, root, scenario};
 
 const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
 /// What the ECU's program may take of any board, bytes: limits of this project, far below what the boards have.
@@ -186,20 +185,6 @@ fn no_panic_is_in_the_panic_free_image() {
 
 fn function_names(image: &Image) -> Vec<String> {
     sim_host::image::function_names(&image.bytes).expect("the image can be read")
-}
-
-fn scenario(waveform: Waveform, application: Application) -> Scenario<f32> {
-    let mut scenario = Scenario::reconstruction();
-    scenario.run.duration_s = 2.0;
-    scenario.dither.start_time_s = 0.5;
-    scenario.dither.waveform = waveform;
-    scenario.dither.application = application;
-    scenario.dither.amplitude_v = match waveform {
-        Waveform::None => 0.0,
-        Waveform::Square => 0.1,
-        Waveform::Sine => 1.0,
-    };
-    scenario
 }
 
 fn instruction_figures(run: &str, instructions: &Instructions) -> Vec<Figure> {

@@ -158,10 +158,37 @@ fn configurations_are_complete_and_read_back() {
     }
 }
 
+const COMMANDS: [&str; 24] = [
+    "verify",
+    "pil",
+    "simulate",
+    "reproduce",
+    "lyapunov",
+    "averaging",
+    "convergence",
+    "orbit",
+    "regions",
+    "equilibria",
+    "basin",
+    "phase",
+    "poincare",
+    "spectrum",
+    "tires",
+    "nonlinearity",
+    "map",
+    "schedule",
+    "realisability",
+    "faults",
+    "config",
+    "decode",
+    "image",
+    "qemu",
+];
+
 #[test]
 fn help_has_examples() {
     let folder = folder();
-    for name in ["verify", "simulate", "config", "decode", "qemu"] {
+    for name in COMMANDS {
         let help = assert_ends(&mut command(folder.path(), [name, "--help"]), 0);
         let text = String::from_utf8_lossy(&help.stdout);
         assert!(

@@ -1,5 +1,8 @@
 //! The map: the same bytes however it is made, against the analysis of single motions, and bad input.
 
+mod common;
+
+use common::{assert_ends, command, folder};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
 use shared_model::Scenario;
@@ -11,34 +14,18 @@ use sim_host::map::plan::{Grid, Place, Plan, Sheet, Start};
 use sim_host::map::table::PLAN_KEY;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
 
 /// A map of 288 cells in three tiles, the last one not full.
 const SMALL: &str = "map --speeds 12 --amplitudes 12 --transient 5 --time 15";
 
-fn sim_host(folder: &Path, threads: &str, line: &str) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_sim-host"))
-        .args(line.split_whitespace())
-        .env("RAYON_NUM_THREADS", threads)
-        .current_dir(folder)
-        .output()
-        .expect("the program starts")
-}
-
 fn assert_well(folder: &Path, threads: &str, line: &str) {
-    let output = sim_host(folder, threads, line);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{line}: {message}");
+    let mut command = command(folder, line.split_whitespace());
+    assert_ends(command.env("RAYON_NUM_THREADS", threads), 0);
 }
 
 /// Expects exit code 2, a message with all of `parts`, and no file `o.csv`.
 fn assert_refused(folder: &Path, line: &str, parts: &[&str]) {
-    let output = sim_host(folder, "2", line);
-    let message = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{line}: {message}");
-    for part in parts {
-        assert!(message.contains(part), "{line}: {message} lacks {part:?}");
-    }
+    common::assert_refused(folder, line.split_whitespace(), parts);
     assert!(!folder.join("o.csv").exists(), "{line}");
 }
 
@@ -58,7 +45,7 @@ fn assert_same(folder: &Path, one: &str, other: &str) {
 
 #[test]
 fn the_same_bytes_for_any_threads_interruptions_and_shards() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder();
     let at = folder.path();
     assert_well(at, "1", &format!("{SMALL} {}", files("one")));
     assert_well(at, "2", &format!("{SMALL} {}", files("two")));
@@ -84,7 +71,7 @@ fn the_same_bytes_for_any_threads_interruptions_and_shards() {
 
 #[test]
 fn tiles_of_another_plan_or_damaged_ones_are_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder();
     let at = folder.path();
     let small = "map --dither square --speeds 12 --amplitudes 12 --transient 5";
     assert_well(at, "2", &format!("{small} --time 15 --work w"));
@@ -107,7 +94,7 @@ fn tiles_of_another_plan_or_damaged_ones_are_refused() {
 
 #[test]
 fn bad_input_is_refused() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder();
     let at = folder.path();
     for (rest, parts) in [
         ("--shard 0/3 --work w", &["0/3", "i from 1 to n"][..]),
@@ -230,7 +217,7 @@ fn cells_agree_with_the_analysis_of_the_motion() {
 
 #[test]
 fn csv_and_parquet_hold_the_same() {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = folder();
     let at = folder.path();
     assert_well(at, "2", &format!("{SMALL} --start both {}", files("map")));
     let mut csv = csv::Reader::from_path(at.join("map.csv")).unwrap();

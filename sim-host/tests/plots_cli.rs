@@ -7,15 +7,6 @@ use common::{assert_ends, command, folder};
 use serde_json::Value;
 use std::fs;
 
-const COMMANDS: [&str; 6] = [
-    "phase",
-    "poincare",
-    "spectrum",
-    "tires",
-    "nonlinearity",
-    "realisability",
-];
-
 /// What a command wrote: columns and rows of its CSV, its JSON, its figure.
 struct Written {
     columns: Vec<String>,
@@ -70,20 +61,6 @@ fn assert_refused(arguments: &[&str], parts: &[&str]) {
     common::assert_refused(folder.path(), all, parts);
     let files = fs::read_dir(folder.path()).expect("the folder is there");
     assert_eq!(files.count(), 0, "{arguments:?} wrote something");
-}
-
-#[test]
-fn help_has_examples() {
-    let folder = folder();
-    for name in COMMANDS {
-        let help = assert_ends(&mut command(folder.path(), [name, "--help"]), 0);
-        let text = String::from_utf8_lossy(&help.stdout);
-        let example = format!("sim-host {name}");
-        assert!(
-            text.contains("Example") && text.contains(&example),
-            "{text}"
-        );
-    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 pub mod golden;
 
 use shared_model::Scenario;
+use shared_model::dither::{Application, Waveform};
 use sim_host::pil::elf::Image;
 use sim_host::pil::qemu::{self, Finished, Machine, RunError};
 use sim_host::pil::settings;
@@ -58,6 +59,21 @@ fn target() -> PathBuf {
 fn open(target: &Path, name: &str) -> Image {
     let path = target.join("thumbv7em-none-eabihf/firmware").join(name);
     Image::open(&path).unwrap_or_else(|error| panic!("{error} (or run `cargo xtask test`)"))
+}
+
+/// A short run with the dither from its first quarter on.
+pub fn scenario(waveform: Waveform, application: Application) -> Scenario<f32> {
+    let mut scenario = Scenario::reconstruction();
+    scenario.run.duration_s = 2.0;
+    scenario.dither.start_time_s = 0.5;
+    scenario.dither.waveform = waveform;
+    scenario.dither.application = application;
+    // Without a waveform no amplitude may count.
+    scenario.dither.amplitude_v = match waveform {
+        Waveform::Sine => 1.0,
+        Waveform::Square | Waveform::None => 0.1,
+    };
+    scenario
 }
 
 /// Runs an image with the settings in `folder`.

@@ -37,7 +37,7 @@ pub fn observe<const K: usize, R: Send>(
     }
     let by_engine = watch.batches(&fit, |batch| {
         let batch: Vec<_> = batch.iter().map(|&k| scenarios[k]).collect();
-        let found = follow(&batch, timing, watched);
+        let found = follow(&batch, timing, watched).expect("the engine can follow each of them");
         batch.iter().zip(&found).map(|(s, f)| see(s, f)).collect()
     });
     let by_steps = watch.points(&unfit, |&k| {
@@ -66,12 +66,15 @@ pub(crate) fn is_fit(scenario: &Scenario<f64>) -> Result<bool, InvalidScenario> 
     Ok(scenario.friction.law == FrictionLaw::None || motion.model().can_stick(motion.injection()))
 }
 
-/// The motions of scenarios that the engine can follow.
-fn follow<const K: usize>(
+/// What is found of motions behind their transients by the engine, as in [`observe`].
+///
+/// # Errors
+/// If a scenario is not valid, or the engine cannot follow it.
+pub(crate) fn follow<const K: usize>(
     scenarios: &[Scenario<f64>],
     timing: Timing,
     watched: Watched,
-) -> Vec<Found<K>> {
+) -> Result<Vec<Found<K>>, Unfit> {
     let transient = Span {
         time_s: timing.transient_s,
         tolerance: TOLERANCE,
@@ -87,7 +90,7 @@ fn follow<const K: usize>(
         pieces,
         ..transient
     };
-    let mut motions = Motions::new(scenarios).expect("the engine can follow each of them");
+    let mut motions = Motions::new(scenarios)?;
     let settled = motions.follow::<0>(&transient);
     motions.go_on_from(&settled);
     let mut found = motions.follow::<K>(&observed);
@@ -97,5 +100,5 @@ fn follow<const K: usize>(
         };
         found.diverged = settled.diverged.or(found.diverged.map(later));
     }
-    found
+    Ok(found)
 }

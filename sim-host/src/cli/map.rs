@@ -1,12 +1,13 @@
 //! `sim-host map`: exponent, period and extent of the motion over wheel speed and dither amplitude.
 
+use super::grid::{GridOptions, TimeOptions};
 use super::output::{Output, check_free};
 use super::{ConfigOptions, Done};
 use anyhow::{bail, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::dither::Waveform;
-use sim_host::chaos::sweep::{Timing, Watch};
+use sim_host::chaos::sweep::Watch;
 use sim_host::config::validate;
 use sim_host::map::cell::{Cell, Kind};
 use sim_host::map::plan::{CELLS_A_TILE, Grid, Plan, Sheet, Start};
@@ -44,60 +45,16 @@ pub struct Arguments {
     /// Starts: the scenario's, the one with the opposite signs, or both
     #[arg(long, value_enum, default_value_t = Starts::Given)]
     start: Starts,
-    /// Least wheel speed, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        default_value_t = 1000.0,
-        allow_negative_numbers = true
-    )]
-    from: f64,
-    /// Greatest wheel speed, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        default_value_t = 2000.0,
-        allow_negative_numbers = true
-    )]
-    to: f64,
-    /// Greatest amplitude of the square wave, V
-    #[arg(
-        long,
-        value_name = "VOLTS",
-        default_value_t = 0.2,
-        allow_negative_numbers = true
-    )]
-    square_to: f64,
-    /// Greatest amplitude of the sine, V
-    #[arg(
-        long,
-        value_name = "VOLTS",
-        default_value_t = 2.0,
-        allow_negative_numbers = true
-    )]
-    sine_to: f64,
+    #[command(flatten)]
+    grid: GridOptions,
     /// Wheel speeds, both ends among them
     #[arg(long, value_name = "COUNT", default_value_t = 256)]
     speeds: usize,
     /// Amplitudes from 0 on, both ends among them
     #[arg(long, value_name = "COUNT", default_value_t = 256)]
     amplitudes: usize,
-    /// What of each run is not looked at, s
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = 100.0,
-        allow_negative_numbers = true
-    )]
-    transient: f64,
-    /// Length of each run, s
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = 200.0,
-        allow_negative_numbers = true
-    )]
-    time: f64,
+    #[command(flatten)]
+    times: TimeOptions,
     /// Folder of the tiles [default: the first file's name with `.tiles` behind it]
     #[arg(long, value_name = "DIR")]
     work: Option<PathBuf>,
@@ -233,18 +190,15 @@ impl Arguments {
             waveforms.iter().map(move |&waveform| Sheet {
                 waveform,
                 start,
-                amplitudes_v: amplitudes_v(match waveform {
-                    Waveform::Sine => self.sine_to,
-                    Waveform::Square | Waveform::None => self.square_to,
-                }),
+                amplitudes_v: amplitudes_v(self.grid.amplitude_to_v(waveform)),
             })
         };
         let speeds_rpm = Grid {
-            from: self.from,
-            to: self.to,
+            from: self.grid.from,
+            to: self.grid.to,
             count: self.speeds,
         };
-        let timing = Timing::new(self.transient, self.time)?;
+        let timing = self.times.timing()?;
         let sheets = starts.iter().copied().flat_map(sheet).collect();
         Ok(Plan::new(scenario, sheets, speeds_rpm, timing)?)
     }

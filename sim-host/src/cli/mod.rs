@@ -7,6 +7,7 @@ mod convergence;
 mod decode;
 mod equilibria;
 mod faults;
+mod grid;
 mod image;
 mod lyapunov;
 mod map;
@@ -173,6 +174,14 @@ impl ConfigOptions {
             say_differences(&scenario);
         }
         Ok(scenario)
+    }
+
+    /// As they are given on a command line, each with a blank before it.
+    fn words(&self) -> String {
+        let preset = self.preset.iter().map(|name| format!(" --preset {name}"));
+        let config = self.config.iter();
+        let config = config.map(|file| format!(" --config {}", file.display()));
+        preset.chain(config).collect()
     }
 }
 

@@ -105,16 +105,16 @@ pub fn write_rows(
 pub struct Destinations {
     /// Write the results as CSV
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
     /// Write the results as JSON
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub json: Option<PathBuf>,
     /// Draw them as an SVG figure
     #[arg(long, value_name = "FILE")]
-    figure: Option<PathBuf>,
+    pub figure: Option<PathBuf>,
     /// Overwrite files that exist
     #[arg(long)]
-    force: bool,
+    pub force: bool,
 }
 
 impl Destinations {

@@ -1,6 +1,6 @@
 //! `sim-host pil`: manoeuvres with the ECU in the loop.
 
-use super::output::{Output, check_all_free, write_json, write_rows, write_text};
+use super::output::{Destinations, Output, check_all_free, write_json, write_rows, write_text};
 use super::{Done, time_out, waveform};
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -25,6 +25,11 @@ use std::path::{Path, PathBuf};
 /// The vehicle moves on the host in f64; once a PWM period the ECU puts out its duty and the vehicle answers. The same run always
 /// gives the same bytes.
 #[derive(clap::Args)]
+#[command(
+    mut_arg("out", |arg| arg.help("Write the vehicle's motion as CSV, one row a control tick")),
+    mut_arg("json", |arg| arg.help("Write the comparisons as JSON")),
+    mut_arg("figure", |arg| arg.help("Draw the manoeuvre as an SVG figure"))
+)]
 #[command(after_help = "Examples:
   sim-host pil                                            1750 rpm, square dither from 3 s
   sim-host pil --rpm 1880 --dither sine --figure pil.svg
@@ -64,18 +69,8 @@ pub struct Arguments {
     /// Replay a recorded run without QEMU, and compare
     #[arg(long, value_name = "FILE", conflicts_with_all = ["scenario", "rpm", "dither", "time", "record", "out", "json", "figure"])]
     replay: Option<PathBuf>,
-    /// Write the vehicle's motion as CSV, one row a control tick
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Write the comparisons as JSON
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Draw the manoeuvre as an SVG figure
-    #[arg(long, value_name = "FILE")]
-    figure: Option<PathBuf>,
-    /// Overwrite files that exist
-    #[arg(long)]
-    force: bool,
+    #[command(flatten)]
+    files: Destinations,
     /// Longest time that the firmware may take for one answer, s
     #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
     time_out: f64,
@@ -105,8 +100,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         // All that is kept of a run that may be long.
         driven.push(Summary::of(&levels));
     }
-    if let Some(path) = &arguments.json {
-        write_json(path, &driven, arguments.force)?;
+    if let Some(path) = &arguments.files.json {
+        write_json(path, &driven, arguments.files.force)?;
     }
     show(&driven, arguments.link);
     Ok(if driven.iter().all(|summary| summary.agree) {
@@ -160,8 +155,8 @@ impl Arguments {
     fn check_outputs(&self, manoeuvres: usize) -> anyhow::Result<()> {
         let of_one = [
             ("--record", &self.record),
-            ("--out", &self.out),
-            ("--figure", &self.figure),
+            ("--out", &self.files.out),
+            ("--figure", &self.files.figure),
         ];
         for (option, path) in of_one {
             ensure!(
@@ -169,8 +164,13 @@ impl Arguments {
                 "{option}: takes one manoeuvre, and there are {manoeuvres}; give one --scenario"
             );
         }
-        let files = [&self.record, &self.out, &self.figure, &self.json];
-        check_all_free(files, self.force)
+        let files = [
+            &self.record,
+            &self.files.out,
+            &self.files.figure,
+            &self.files.json,
+        ];
+        check_all_free(files, self.files.force)
     }
 
     fn write(
@@ -185,15 +185,15 @@ impl Arguments {
                 scenario: ecu_scenario(scenario, manoeuvre),
                 exchanges: run.exchanges.clone(),
             };
-            let mut output = Output::create(path, self.force)?;
+            let mut output = Output::create(path, self.files.force)?;
             recording.write(output.writer())?;
             output.finish()?;
         }
-        if let Some(path) = &self.out {
-            write_rows(path, &run.records, self.force)?;
+        if let Some(path) = &self.files.out {
+            write_rows(path, &run.records, self.files.force)?;
         }
-        if let Some(path) = &self.figure {
-            write_text(path, &report::drive(&levels.name, run)?, self.force)?;
+        if let Some(path) = &self.files.figure {
+            write_text(path, &report::drive(&levels.name, run)?, self.files.force)?;
         }
         Ok(())
     }

@@ -1,19 +1,23 @@
 //! `sim-host schedule`: the amplitude of dither that each wheel speed needs, as the table that the ECU carries.
 
+use super::grid::{GridOptions, TimeOptions};
 use super::output::{check_all_free, write_json, write_rows, write_text};
 use super::sweep::with_progress;
 use super::{ConfigOptions, Done};
-use anyhow::{bail, ensure};
+use anyhow::{Context, anyhow, bail, ensure};
 use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use sim_host::chaos::sweep::{Timing, Values};
 use sim_host::config::{differences, validate};
+use sim_host::map::cell::Cell as MapCell;
+use sim_host::map::plan::Plan as MapPlan;
 use sim_host::report::schedule_map;
 use sim_host::schedule::choose::Choice;
 use sim_host::schedule::map::Cell;
-use sim_host::schedule::{Analysis, Plan, runs, schedule, table};
-use std::path::PathBuf;
+use sim_host::schedule::{Analysis, Plan, from_map, runs, schedule, table};
+use std::fs::File;
+use std::path::{Path, PathBuf};
 
 /// The dither amplitude W that each wheel speed N needs, for square wave and sine: the table that the ECU carries.
 ///
@@ -21,31 +25,25 @@ use std::path::PathBuf;
 /// undithered motion from both is at rest or of period one, the entry is 0. Elsewhere it is the least amplitude of the first
 /// range that gives period one (one start may end at rest) at that speed and no worse at its neighbours, plus a margin. The
 /// map uses the mean of the dither; the entries are then checked with the true signal at the PWM rate, at the table's speeds
-/// and midway. About a minute and a half on 2 cores. Exit code 1 if a speed has no such amplitude or a check fails.
+/// and midway. Ten seconds on 2 cores. Exit code 1 if a speed has no such amplitude or a check fails.
 #[derive(clap::Args)]
+// Finer and longer than a map for the eye.
+#[command(
+    mut_arg("square_to", |arg| arg.default_value("0.15")),
+    mut_arg("sine_to", |arg| arg.default_value("1.35")),
+    mut_arg("transient", |arg| arg.default_value("150"))
+)]
 #[command(after_help = "Examples:
   sim-host schedule --figure schedule.svg --csv map.csv
   sim-host schedule --config heavier.toml --from 1400 --step 50 --margin 0.5 --json schedule.json
+  sim-host map --start both --speeds 41 --amplitudes 31 --square-to 0.15 --sine-to 1.35 --transient 150 --parquet map.parquet
+  sim-host schedule --map map.parquet        the same schedule from that map
   sim-host schedule --out shared-model/src/schedule_table.rs --force       the table of the ECU, then build the firmware")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,
-    /// First wheel speed, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        default_value_t = 1000.0,
-        allow_negative_numbers = true
-    )]
-    from: f64,
-    /// Last wheel speed, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        default_value_t = 2000.0,
-        allow_negative_numbers = true
-    )]
-    to: f64,
+    #[command(flatten)]
+    grid: GridOptions,
     /// Step of the wheel speed, rpm
     #[arg(
         long,
@@ -54,22 +52,6 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     step: f64,
-    /// Greatest amplitude of the square wave, V
-    #[arg(
-        long,
-        value_name = "VOLTS",
-        default_value_t = 0.15,
-        allow_negative_numbers = true
-    )]
-    square_to: f64,
-    /// Greatest amplitude of the sine, V
-    #[arg(
-        long,
-        value_name = "VOLTS",
-        default_value_t = 1.35,
-        allow_negative_numbers = true
-    )]
-    sine_to: f64,
     /// Steps from 0 to the greatest amplitude; edges are bisected to a sixteenth of a step
     #[arg(long, value_name = "COUNT", default_value_t = 30, value_parser = clap::value_parser!(u32).range(2..=1000))]
     amplitudes: u32,
@@ -81,22 +63,12 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     margin: f64,
-    /// What of each run is not looked at, s
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = 150.0,
-        allow_negative_numbers = true
-    )]
-    transient: f64,
-    /// Length of each run, s
-    #[arg(
-        long,
-        value_name = "SECONDS",
-        default_value_t = 200.0,
-        allow_negative_numbers = true
-    )]
-    time: f64,
+    #[command(flatten)]
+    times: TimeOptions,
+    /// Take the cells of the grid from a map's Parquet file instead of running them; it must be of the same scenario, times and
+    /// grid, from both starts
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
     /// Write the table as Rust source, the module `shared_model::schedule_table`
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -149,9 +121,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         &arguments.figure,
     ];
     check_all_free(files, arguments.force)?;
+    let first_cells = arguments.first_cells(&scenario, &plans)?;
     let mut analyses = Vec::new();
-    for (scenario, plan) in plans {
-        let made = with_progress(runs(&plan), |watch| schedule(&scenario, &plan, watch))?;
+    for ((scenario, plan), first) in plans.into_iter().zip(first_cells) {
+        let known = first.as_ref().map_or(0, |cells| 2 * cells.len());
+        let made = with_progress(runs(&plan) - known, |watch| {
+            schedule(&scenario, &plan, first, watch)
+        })?;
         let Some(analysis) = made else {
             bail!("interrupted: a schedule needs all of its runs; no file was written");
         };
@@ -179,24 +155,76 @@ impl Arguments {
             "--margin {}: must be a share from 0 to 1",
             self.margin
         );
-        let (what, to_v) = match waveform {
-            Waveform::Sine => ("amplitude of the sine (V)", self.sine_to),
-            Waveform::Square | Waveform::None => {
-                ("amplitude of the square wave (V)", self.square_to)
-            }
+        let what = match waveform {
+            Waveform::Sine => "amplitude of the sine (V)",
+            Waveform::Square | Waveform::None => "amplitude of the square wave (V)",
         };
+        let to_v = self.grid.amplitude_to_v(waveform);
         let step_v = to_v / f64::from(self.amplitudes);
         let plan = Plan {
-            speeds_rpm: Values::new("wheel speed (rpm)", self.from, self.to, self.step)?,
+            speeds_rpm: Values::new("wheel speed (rpm)", self.grid.from, self.grid.to, self.step)?,
             amplitudes_v: Values::new(what, 0.0, to_v, step_v)?,
             edge_width_v: EDGE_SHARE * step_v,
             margin: self.margin,
-            timing: Timing::new(self.transient, self.time)?,
+            timing: self.times.timing()?,
         };
         let mut scenario = *scenario;
         scenario.dither.waveform = waveform;
         plan.validate(&scenario)?;
         Ok((scenario, plan))
+    }
+
+    /// The cells of each plan's grid, as far as there is a map.
+    fn first_cells(
+        &self,
+        scenario: &Scenario<f64>,
+        plans: &[(Scenario<f64>, Plan); 2],
+    ) -> anyhow::Result<[Option<Vec<Cell>>; 2]> {
+        let Some(path) = &self.map else {
+            return Ok([None, None]);
+        };
+        let [(_, square), (_, sine)] = plans;
+        let fitting = from_map::fitting(scenario, square, sine)
+            .context("no map fits this schedule, so leave --map out")?;
+        let (map, cells) = self.read_map(path, &fitting).map_err(|error| {
+            let command = self.map_command(path, &fitting);
+            anyhow!(
+                "cannot use {}: {error:#}; this makes one that fits: `{command}`",
+                path.display()
+            )
+        })?;
+        let of = |waveform, plan| from_map::first_cells(&map, &cells, waveform, plan);
+        Ok([of(Waveform::Square, square), of(Waveform::Sine, sine)])
+    }
+
+    fn read_map(&self, path: &Path, fitting: &MapPlan) -> anyhow::Result<(MapPlan, Vec<MapCell>)> {
+        let (map, cells) = sim_host::map::table::read(File::open(path)?)?;
+        let misfits = from_map::misfits(&map, fitting);
+        ensure!(misfits.is_empty(), "{}", misfits.join("; "));
+        Ok((map, cells))
+    }
+
+    /// The command that makes a map: at `path`, unless there is something already.
+    fn map_command(&self, path: &Path, map: &MapPlan) -> String {
+        let path = if path.exists() {
+            Path::new("fitting.parquet")
+        } else {
+            path
+        };
+        let (speeds, amplitudes) = (&map.speeds_rpm, &map.sheets[0].amplitudes_v);
+        format!(
+            "sim-host map{} --start both --from {} --to {} --speeds {} --square-to {} --sine-to {} --amplitudes {} --transient {} --time {} --parquet {}",
+            self.config.words(),
+            speeds.from,
+            speeds.to,
+            speeds.count,
+            self.grid.square_to,
+            self.grid.sine_to,
+            amplitudes.count,
+            self.times.transient,
+            self.times.time,
+            path.display()
+        )
     }
 
     fn write(&self, scenario: &Scenario<f64>, analyses: &[Analysis]) -> anyhow::Result<()> {
@@ -210,7 +238,7 @@ impl Arguments {
         if let Some(path) = &self.json {
             let results = Results {
                 margin: self.margin,
-                timing: Timing::new(self.transient, self.time)?,
+                timing: self.times.timing()?,
                 schedules: analyses,
             };
             write_json(path, &results, self.force)?;
@@ -231,11 +259,16 @@ impl Arguments {
         vec![
             format!(
                 "Made by `sim-host schedule --from {} --to {} --step {} --square-to {} --sine-to {} --amplitudes {}",
-                self.from, self.to, self.step, self.square_to, self.sine_to, self.amplitudes
+                self.grid.from,
+                self.grid.to,
+                self.step,
+                self.grid.square_to,
+                self.grid.sine_to,
+                self.amplitudes
             ),
             format!(
                 "--margin {} --transient {} --time {} --out FILE`; not to be edited by hand. Parameters: {parameters}.",
-                self.margin, self.transient, self.time
+                self.margin, self.times.transient, self.times.time
             ),
         ]
     }

@@ -2,15 +2,14 @@
 
 use super::plan::{Place, Plan, Start};
 use crate::chaos::attractor::{self, kind};
-use crate::chaos::lyapunov::{PIECES, WARM_UP, largest_of};
-use crate::chaos::period::{PROMINENCE, Period, TOLERANCE, period_of_maxima, prominent_maxima};
-use crate::engine::taylor::{Found, Motions, Span, Unfit, Watched};
+use crate::chaos::lyapunov::largest_of;
+use crate::chaos::observe::follow;
+use crate::chaos::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
+use crate::chaos::sweep::Timing;
+use crate::engine::taylor::{Found, Unfit, Watched};
 use serde::{Deserialize, Serialize};
 use shared_model::dither::Waveform;
-use shared_model::vehicle::{STEERING_ANGLE, State, YAW_RATE};
-
-/// Largest last term of a step's expansion, in rad and rad/s.
-const TOLERANCE_OF_STEP: f64 = 1e-12;
+use shared_model::vehicle::{STEERING_ANGLE, YAW_RATE};
 
 /// The kind of a motion, as [`attractor::Kind`] without its numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -53,7 +52,7 @@ pub struct Cell {
     pub dither_amplitude_v: f64,
     /// Kind of the motion.
     pub kind: Kind,
-    /// Maxima of the yaw rate in a cycle; 0 at rest, none without a cycle.
+    /// Maxima of the yaw rate in a cycle, whatever the exponent says; 0 at rest, none without a cycle.
     pub period: Option<u32>,
     /// Bands that the maxima of a chaotic motion visit in turn.
     pub bands: Option<u32>,
@@ -71,6 +70,18 @@ pub struct Cell {
     pub diverges_at_s: Option<f64>,
 }
 
+impl Cell {
+    /// Where it lies.
+    pub fn place(&self) -> Place {
+        Place {
+            waveform: self.waveform,
+            start: self.start,
+            wheel_speed_rpm: self.wheel_speed_rpm,
+            dither_amplitude_v: self.dither_amplitude_v,
+        }
+    }
+}
+
 /// The cells at some places of a plan.
 ///
 /// Motions run through their transients without tangent vectors. The exponent is taken over what follows but for its first tenth.
@@ -79,39 +90,19 @@ pub struct Cell {
 /// If a place's scenario is not valid, or none for the engine.
 pub fn cells(plan: &Plan, places: &[Place]) -> Result<Vec<Cell>, Unfit> {
     let scenarios: Vec<_> = places.iter().map(|place| plan.motion(place)).collect();
-    let mut motions = Motions::new(&scenarios)?;
-    let transient = Span {
-        time_s: plan.transient_s,
-        tolerance: TOLERANCE_OF_STEP,
-        watched: Watched::default(),
-        warm_up_s: 0.0,
-        pieces: 0,
+    let timing = Timing {
+        transient_s: plan.transient_s,
+        observed_s: plan.observed_s,
     };
-    let settled = motions.follow::<0>(&transient);
-    motions.go_on_from(&settled);
     let mut watched = Watched::default();
     watched.turns[YAW_RATE] = true;
     watched.turns[STEERING_ANGLE] = true;
-    let observed = Span {
-        time_s: plan.observed_s,
-        watched,
-        warm_up_s: WARM_UP * plan.observed_s,
-        pieces: PIECES,
-        ..transient
+    let found = follow::<1>(&scenarios, timing, watched)?;
+    let cell = |(place, found): (&Place, &Found<1>)| match found.diverged {
+        Some(diverged) => diverging(place, diverged.time_s),
+        None => staying(place, plan, found),
     };
-    let found = motions.follow::<1>(&observed);
-    let cell = |((place, settled), found): ((&Place, &Found<0>), &Found<1>)| {
-        let later = |time_s| plan.transient_s + time_s;
-        let diverges_at_s = match (settled.diverged, found.diverged) {
-            (Some(diverged), _) => Some(diverged.time_s),
-            (None, diverged) => diverged.map(|d| later(d.time_s)),
-        };
-        match diverges_at_s {
-            Some(time_s) => diverging(place, time_s),
-            None => staying(place, plan, &settled.end, found),
-        }
-    };
-    Ok(places.iter().zip(&settled).zip(&found).map(cell).collect())
+    Ok(places.iter().zip(&found).map(cell).collect())
 }
 
 fn diverging(place: &Place, time_s: f64) -> Cell {
@@ -132,9 +123,9 @@ fn diverging(place: &Place, time_s: f64) -> Cell {
     }
 }
 
-fn staying(place: &Place, plan: &Plan, begin: &State<f64>, found: &Found<1>) -> Cell {
+fn staying(place: &Place, plan: &Plan, found: &Found<1>) -> Cell {
     let range = |component: usize| found.upper[component] - found.lower[component];
-    let maxima = yaw_rate_maxima(begin, found, plan.observed_s);
+    let maxima = maxima_of_turns(&found.turns[YAW_RATE], range(YAW_RATE));
     let period = period_of_maxima(&maxima, range(YAW_RATE), TOLERANCE);
     let exponent = largest_of(found, &maxima, plan.observed_s);
     let kind = kind(period, exponent, true, &maxima);
@@ -158,15 +149,4 @@ fn staying(place: &Place, plan: &Plan, begin: &State<f64>, found: &Found<1>) -> 
         diverges_at_s: None,
         ..diverging(place, 0.0)
     }
-}
-
-/// Time (s) and height (rad/s) of the maxima that stand out by a hundredth of the range.
-fn yaw_rate_maxima(begin: &State<f64>, found: &Found<1>, time_s: f64) -> Vec<(f64, f64)> {
-    let mut turns = vec![(0.0, begin.x[YAW_RATE])];
-    turns.extend(&found.turns[YAW_RATE]);
-    turns.push((time_s, found.end.x[YAW_RATE]));
-    let heights: Vec<f64> = turns.iter().map(|turn| turn.1).collect();
-    let range = found.upper[YAW_RATE] - found.lower[YAW_RATE];
-    let maxima = prominent_maxima(&heights, PROMINENCE * range);
-    maxima.into_iter().map(|k| turns[k]).collect()
 }

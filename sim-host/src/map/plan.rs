@@ -3,6 +3,7 @@
 use crate::chaos::observe::is_fit;
 use crate::chaos::sweep::{SweepError, Timing, Values, mirrored};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use shared_model::dither::Waveform;
 use shared_model::{InvalidScenario, Scenario};
 
@@ -29,10 +30,9 @@ impl Grid {
         (self.to - self.from) / (self.count - 1) as f64
     }
 
-    /// Value number `k`, from 0 on; rpm or V.
+    /// Value number `k`, from 0 on; rpm or V. Bit for bit that of a sweep in these steps.
     pub fn at(&self, k: usize) -> f64 {
-        let share = k as f64 / (self.count - 1) as f64;
-        self.from + share * (self.to - self.from)
+        self.from + k as f64 * self.step()
     }
 
     fn validate(&self, what: &'static str) -> Result<(), PlanError> {
@@ -108,6 +108,9 @@ pub enum PlanError {
         /// Its cells.
         cells: usize,
     },
+    /// Sheets of different sizes.
+    #[error("the sheets of a map must have as many amplitudes each")]
+    Uneven,
     /// A cell's scenario is not valid.
     #[error(transparent)]
     Scenario(#[from] InvalidScenario),
@@ -138,20 +141,45 @@ impl Plan {
             transient_s: timing.transient_s,
             observed_s: timing.observed_s,
         };
-        plan.speeds_rpm.validate("wheel speed (rpm)")?;
-        for sheet in &plan.sheets {
+        plan.validate()?;
+        Ok(plan)
+    }
+
+    /// Checks a plan that comes from outside.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn validate(&self) -> Result<(), PlanError> {
+        self.speeds_rpm.validate("wheel speed (rpm)")?;
+        for sheet in &self.sheets {
             sheet.amplitudes_v.validate("dither amplitude (V)")?;
         }
-        let cells = plan.cells();
+        let cells = self.cells();
         if cells == 0 || cells > MOST_CELLS {
             return Err(PlanError::Size { cells });
         }
-        for corner in plan.corners() {
+        let amplitudes = |sheet: &Sheet| sheet.amplitudes_v.count;
+        if self
+            .sheets
+            .windows(2)
+            .any(|pair| amplitudes(&pair[0]) != amplitudes(&pair[1]))
+        {
+            return Err(PlanError::Uneven);
+        }
+        for corner in self.corners() {
             if !is_fit(&corner)? {
                 return Err(PlanError::Friction);
             }
         }
-        Ok(plan)
+        Ok(())
+    }
+
+    /// In what it differs from another plan, each as `key is its value, not the other's`.
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        let value = |plan| serde_json::to_value(plan).unwrap_or_default();
+        let mut differences = Vec::new();
+        differ("", &value(self), &value(other), &mut differences);
+        differences
     }
 
     /// Cells in all sheets.
@@ -220,6 +248,25 @@ impl Plan {
         };
         let sheets = self.sheets.iter().flat_map(of_sheet);
         sheets.flatten().collect()
+    }
+}
+
+/// Collects the keys at which two values differ, with both.
+fn differ(key: &str, own: &Value, other: &Value, differences: &mut Vec<String>) {
+    match (own.as_object(), other.as_object()) {
+        (Some(own), Some(other)) => {
+            for (name, value) in own {
+                let key = if key.is_empty() {
+                    name.clone()
+                } else {
+                    format!("{key}.{name}")
+                };
+                let other = other.get(name).unwrap_or(&Value::Null);
+                differ(&key, value, other, differences);
+            }
+        }
+        _ if own != other => differences.push(format!("{key} is {own}, not {other}")),
+        _ => {}
     }
 }
 

@@ -1,14 +1,19 @@
-//! The map as a Parquet table: the columns of the CSV, and the plan beside them.
+//! The map as a Parquet table: the columns of the CSV, and the plan beside them. Written, and read back.
 
 use super::cell::Cell;
 use super::plan::Plan;
+use anyhow::{Context, bail, ensure};
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
-use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::{FileMetaData, KeyValue};
 use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::fs::File;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -53,6 +58,64 @@ pub fn write(plan: &Plan, cells: &[Cell], to: impl Write + Send) -> anyhow::Resu
     rows.close()?;
     file.close()?;
     Ok(())
+}
+
+/// Reads plan and cells of a table, the cells in the plan's order.
+///
+/// # Errors
+/// If it is no table that this version of the program has written, or a damaged one.
+pub fn read(from: File) -> anyhow::Result<(Plan, Vec<Cell>)> {
+    let none = "it is no Parquet file, or not a whole one";
+    let table = SerializedFileReader::new(from).context(none)?;
+    let plan = plan(table.metadata().file_metadata())?;
+    let rows = table.get_row_iter(None)?;
+    let cells = rows.map(|row| cell(&row?)).collect::<Result<Vec<_>, _>>()?;
+    let places = (0..plan.tiles()).flat_map(|tile| plan.places(tile));
+    ensure!(
+        cells.iter().map(Cell::place).eq(places),
+        "its rows are not the cells of its plan"
+    );
+    Ok((plan, cells))
+}
+
+/// The one key of a plan that all versions of the program have.
+#[derive(Deserialize)]
+struct MadeBy {
+    version: String,
+}
+
+fn plan(metadata: &FileMetaData) -> anyhow::Result<Plan> {
+    let mut pairs = metadata.key_value_metadata().into_iter().flatten();
+    let plan = pairs.find(|pair| pair.key == PLAN_KEY);
+    let plan = plan.and_then(|pair| pair.value.as_deref());
+    let json = plan.context("it has no plan of a map in its metadata")?;
+    let unreadable = "its plan cannot be read";
+    let MadeBy { version } = serde_json::from_str(json).context(unreadable)?;
+    let own = env!("CARGO_PKG_VERSION");
+    ensure!(
+        version == own,
+        "version {version} of the program made it, and this is {own}"
+    );
+    let plan: Plan = serde_json::from_str(json).context(unreadable)?;
+    plan.validate().context("its plan is none")?;
+    Ok(plan)
+}
+
+/// A row as a cell, by the names of its columns.
+fn cell(row: &Row) -> anyhow::Result<Cell> {
+    let named = |(name, field): (&String, &Field)| {
+        let value = match field {
+            Field::Null => Value::Null,
+            Field::Str(name) => name.as_str().into(),
+            Field::Int(count) => (*count).into(),
+            Field::Double(number) => (*number).into(),
+            other => bail!("{name} is {other}, which no column of a map holds"),
+        };
+        Ok((name.clone(), value))
+    };
+    let fields = row.get_column_iter().map(named);
+    let fields = Value::Object(fields.collect::<Result<_, _>>()?);
+    serde_json::from_value(fields).context("a row is no cell of a map")
 }
 
 fn columns(cells: &[Cell]) -> anyhow::Result<Vec<Column>> {
@@ -100,8 +163,8 @@ fn names<T: Serialize>(
     of: fn(&Cell) -> T,
 ) -> anyhow::Result<Column> {
     let text = |cell| match serde_json::to_value(of(cell))? {
-        serde_json::Value::String(text) => Ok(ByteArray::from(text.into_bytes())),
-        other => anyhow::bail!("{name}: {other} is no name"),
+        Value::String(text) => Ok(ByteArray::from(text.into_bytes())),
+        other => bail!("{name}: {other} is no name"),
     };
     Ok(Column {
         name,
@@ -130,7 +193,7 @@ impl Column {
     fn write<W: Write + Send>(&self, rows: &mut SerializedRowGroupWriter<W>) -> anyhow::Result<()> {
         let mut column = rows
             .next_column()?
-            .ok_or_else(|| anyhow::anyhow!("the table has no column {}", self.name))?;
+            .with_context(|| format!("the table has no column {}", self.name))?;
         match &self.values {
             Values::Names(names) => {
                 column
@@ -168,4 +231,89 @@ fn levels<T>(values: &[Option<T>]) -> Vec<i16> {
         .iter()
         .map(|value| i16::from(value.is_some()))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chaos::sweep::Timing;
+    use crate::map::cell::{Kind, cells};
+    use crate::map::plan::{Grid, Sheet, Start};
+    use shared_model::Scenario;
+    use shared_model::dither::Waveform;
+
+    /// A map with cells of each kind.
+    fn map() -> (Plan, Vec<Cell>) {
+        let grid = |from, to| Grid { from, to, count: 3 };
+        let sheet = |start| Sheet {
+            waveform: Waveform::Square,
+            start,
+            amplitudes_v: grid(0.0, 0.1),
+        };
+        let sheets = vec![sheet(Start::Given), sheet(Start::Mirrored)];
+        let timing = Timing::new(1.0, 3.0).unwrap();
+        let speeds = grid(1600.0, 1700.1);
+        let plan = Plan::new(Scenario::reconstruction(), sheets, speeds, timing).unwrap();
+        let mut cells = cells(&plan, &plan.places(0)).unwrap();
+        let kinds = [
+            (Kind::Equilibrium, Some(0), None),
+            (Kind::Periodic, Some(16), None),
+            (Kind::Chaos, None, Some(2)),
+            (Kind::Undecided, Some(1), None),
+            (Kind::Diverges, None, None),
+        ];
+        for (cell, (kind, period, bands)) in cells.iter_mut().zip(kinds) {
+            (cell.kind, cell.period, cell.bands) = (kind, period, bands);
+        }
+        cells[0].exponent_per_s = None;
+        cells[4].diverges_at_s = Some(0.1 + 0.2);
+        (plan, cells)
+    }
+
+    fn written(plan: &Plan, cells: &[Cell]) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        write(plan, cells, &mut bytes).unwrap();
+        bytes
+    }
+
+    fn read_back(bytes: &[u8]) -> anyhow::Result<(Plan, Vec<Cell>)> {
+        let mut file = tempfile::tempfile()?;
+        file.write_all(bytes)?;
+        read(file)
+    }
+
+    fn assert_refused(bytes: &[u8], part: &str) {
+        let refusal = format!("{:#}", read_back(bytes).unwrap_err());
+        assert!(refusal.contains(part), "{refusal} lacks {part:?}");
+    }
+
+    #[test]
+    fn what_is_written_is_read() {
+        let (plan, cells) = map();
+        let read = read_back(&written(&plan, &cells)).unwrap();
+        assert_eq!(read, (plan, cells));
+    }
+
+    #[test]
+    fn what_is_no_map_is_refused() {
+        let (mut plan, mut cells) = map();
+        let whole = written(&plan, &cells);
+        for length in [0, 3, 100, whole.len() - 1] {
+            assert_refused(&whole[..length], "not a whole one");
+        }
+        let mut other_key = whole.clone();
+        let is_key = |bytes: &[u8]| bytes == b"\x04plan";
+        let key = other_key.windows(5).rposition(is_key).unwrap();
+        other_key[key + 1..key + 5].copy_from_slice(b"nalp");
+        assert_refused(&other_key, "no plan of a map");
+        let few = written(&plan, &cells[1..]);
+        assert_refused(&few, "not the cells of its plan");
+        cells.swap(0, 1);
+        let swapped = written(&plan, &cells);
+        assert_refused(&swapped, "not the cells of its plan");
+        plan.sheets[1].amplitudes_v.count = 4;
+        assert_refused(&written(&plan, &cells), "as many amplitudes");
+        plan.version = "0.0.1".into();
+        assert_refused(&written(&plan, &cells), "version 0.0.1 of the program");
+    }
 }

@@ -83,7 +83,7 @@ impl<'a> Folder<'a> {
                 plan == *folder.plan,
                 "{} holds tiles of another map: {}; give another --work, or delete them",
                 path.display(),
-                difference(&plan, folder.plan)
+                plan.differences(folder.plan).join(", ")
             );
         }
         Ok(folder)
@@ -130,13 +130,13 @@ impl<'a> Folder<'a> {
             ensure!(
                 header.plan == *self.plan,
                 "it is of another map: {}",
-                difference(&header.plan, self.plan)
+                header.plan.differences(self.plan).join(", ")
             );
             ensure!(header.tile == tile, "it is tile {}", header.tile);
             let cells = csv::Reader::from_reader(rows.as_bytes())
                 .into_deserialize()
                 .collect::<Result<Vec<Cell>, _>>()?;
-            let places: Vec<Place> = cells.iter().map(place).collect();
+            let places: Vec<Place> = cells.iter().map(Cell::place).collect();
             ensure!(
                 places == self.plan.places(tile),
                 "its cells are not complete"
@@ -144,15 +144,6 @@ impl<'a> Folder<'a> {
             Ok(cells)
         };
         cells().with_context(|| format!("cannot use {}; delete it to make it anew", file.display()))
-    }
-}
-
-fn place(cell: &Cell) -> Place {
-    Place {
-        waveform: cell.waveform,
-        start: cell.start,
-        wheel_speed_rpm: cell.wheel_speed_rpm,
-        dither_amplitude_v: cell.dither_amplitude_v,
     }
 }
 
@@ -207,38 +198,4 @@ fn header(file: &Path) -> anyhow::Result<Header> {
     let unusable = || format!("cannot use {}; delete it to make it anew", file.display());
     let text = fs::read_to_string(file).with_context(unusable)?;
     serde_json::from_str(text.lines().next().unwrap_or_default()).with_context(unusable)
-}
-
-/// In what two plans differ, in words.
-fn difference(theirs: &Plan, ours: &Plan) -> String {
-    let value = |plan| serde_json::to_value(plan).unwrap_or_default();
-    let mut differences = Vec::new();
-    differ("", &value(theirs), &value(ours), &mut differences);
-    differences.join(", ")
-}
-
-/// Collects the keys at which two values differ, with both.
-fn differ(
-    key: &str,
-    theirs: &serde_json::Value,
-    ours: &serde_json::Value,
-    differences: &mut Vec<String>,
-) {
-    match (theirs.as_object(), ours.as_object()) {
-        (Some(theirs), Some(ours)) => {
-            for (name, value) in theirs {
-                let key = if key.is_empty() {
-                    name.clone()
-                } else {
-                    format!("{key}.{name}")
-                };
-                let ours = ours.get(name).unwrap_or(&serde_json::Value::Null);
-                differ(&key, value, ours, differences);
-            }
-        }
-        _ if theirs != ours => {
-            differences.push(format!("their {key} is {theirs}, not {ours}"));
-        }
-        _ => {}
-    }
 }

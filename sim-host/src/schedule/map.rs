@@ -128,10 +128,12 @@ pub fn cells(
 
 /// The column of each wheel speed of the plan; `None` if it was stopped.
 ///
-/// Edges are bisected between rest, period one and all else, all of them side by side; those within all else are not.
+/// It begins with the plan's grid, whose cells are run unless they are there `first`. Edges are bisected between rest, period
+/// one and all else, all of them side by side; those within all else are not.
 pub(super) fn columns(
     scenario: &Scenario<f64>,
     plan: &Plan,
+    first: Option<Vec<Cell>>,
     watch: Watch,
 ) -> Result<Option<Vec<Column>>, SweepError> {
     let at = |rpm, volts| {
@@ -139,13 +141,15 @@ pub(super) fn columns(
         Parameter::Amplitude.set(&scenario, volts)
     };
     let of_speed = |rpm| plan.amplitudes_v.iter().map(move |volts| at(rpm, volts));
-    let mut level: Vec<_> = plan.speeds_rpm.iter().flat_map(of_speed).collect();
-    let mut all: Vec<Cell> = Vec::new();
-    while !level.is_empty() {
-        let Some(made) = cells(&level, plan.timing, watch)? else {
-            return Ok(None);
-        };
-        all.extend(made);
+    let grid = || {
+        let grid: Vec<_> = plan.speeds_rpm.iter().flat_map(of_speed).collect();
+        cells(&grid, plan.timing, watch)
+    };
+    let first = first.map_or_else(grid, |first| Ok(Some(first)))?;
+    let Some(mut all) = first else {
+        return Ok(None);
+    };
+    loop {
         let place = |cell: &Cell| (cell.wheel_speed_rpm, cell.amplitude_v);
         all.sort_by(|a, b| {
             let ((rpm, volts), (other_rpm, other_volts)) = (place(a), place(b));
@@ -156,14 +160,25 @@ pub(super) fn columns(
             middle_v(&pair[0], &pair[1], plan.edge_width_v)
                 .map(|volts| at(pair[0].wheel_speed_rpm, volts))
         });
-        level = middles.collect();
+        let level: Vec<_> = middles.collect();
+        if level.is_empty() {
+            return Ok(Some(by_speed(&all)));
+        }
+        let Some(made) = cells(&level, plan.timing, watch)? else {
+            return Ok(None);
+        };
+        all.extend(made);
     }
-    let columns = all.chunk_by(|a, b| a.wheel_speed_rpm == b.wheel_speed_rpm);
+}
+
+/// The columns of cells that are sorted by speed.
+fn by_speed(cells: &[Cell]) -> Vec<Column> {
+    let columns = cells.chunk_by(|a, b| a.wheel_speed_rpm == b.wheel_speed_rpm);
     let column = |cells: &[Cell]| Column {
         wheel_speed_rpm: cells[0].wheel_speed_rpm,
         cells: cells.to_vec(),
     };
-    Ok(Some(columns.map(column).collect()))
+    columns.map(column).collect()
 }
 
 /// The amplitude between two cells of a column with an edge that is too wide between them, V.

@@ -3,12 +3,14 @@
 //! | question | module |
 //! |---|---|
 //! | which kind of motion has each N and W? | [`map`] |
+//! | which of that does a map know already? | [`from_map`] |
 //! | which W for which N? | [`choose`] |
 //! | does it hold under the true dither signal? | [`check`] |
 //! | how does the ECU get it? | [`table`] |
 
 pub mod check;
 pub mod choose;
+pub mod from_map;
 pub mod map;
 pub mod table;
 
@@ -90,18 +92,19 @@ pub fn runs(plan: &Plan) -> usize {
 /// Makes the schedule of the scenario's waveform: map, choice, check.
 ///
 /// The map takes the mean of the dither. A range of W narrower than the step between amplitudes can be missed, but none is
-/// used that is narrower than a count of the PWM. The result does not depend on the number of threads. `None` if it was
-/// stopped.
+/// used that is narrower than a count of the PWM. The result does not depend on the number of threads. The cells of the plan's
+/// grid are run, unless [`from_map::first_cells`] gives them as `first`. `None` if it was stopped.
 ///
 /// # Errors
 /// If the scenario has no waveform, or one of a speed and amplitude is not valid.
 pub fn schedule(
     scenario: &Scenario<f64>,
     plan: &Plan,
+    first: Option<Vec<Cell>>,
     watch: Watch,
 ) -> Result<Option<Analysis>, SweepError> {
     plan.validate(scenario)?;
-    let Some(columns) = columns(scenario, plan, watch)? else {
+    let Some(columns) = columns(scenario, plan, first, watch)? else {
         return Ok(None);
     };
     let count_v = Pwm::new(&scenario.servo, scenario.run.pwm_rate_hz).volts_per_count();
