@@ -451,7 +451,7 @@ mod tests {
         ) {
             let parts = model(&scenario);
             let mode = FrictionMode::Positive;
-            let small = 1e-5;
+            let small = 1e-6;
             let [here, found] = expansion(&parts, mode, &x, &tangent);
             let [ahead, _] = expansion(&parts, mode, &(x + tangent * small), &tangent);
             let [behind, _] = expansion(&parts, mode, &(x - tangent * small), &tangent);
