@@ -8,7 +8,7 @@ use shared_model::vehicle::SlipForm;
 use sim_host::chaos::flow::VehicleFlow;
 use sim_host::chaos::lyapunov::exponents;
 use sim_host::engine::reference::Reference;
-use sim_host::engine::taylor::{Found, Motions, Span, Unfit, Watched};
+use sim_host::engine::taylor::{Compiled, Found, Motions, Span, Tangents, Unfit, Watched};
 
 fn span(time_s: f64) -> Span {
     Span {
@@ -20,7 +20,10 @@ fn span(time_s: f64) -> Span {
     }
 }
 
-fn follow<const K: usize>(scenarios: &[Scenario<f64>], span: &Span) -> Vec<Found<K>> {
+fn follow<const K: usize>(scenarios: &[Scenario<f64>], span: &Span) -> Vec<Found<K>>
+where
+    Tangents<K>: Compiled<K>,
+{
     Motions::new(scenarios).expect("all fit").follow(span)
 }
 

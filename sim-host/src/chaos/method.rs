@@ -6,7 +6,7 @@ use crate::chaos::observe::observe;
 use crate::chaos::sweep::{Timing, Watch};
 use crate::chaos::synchronisation::{self, NoThreshold, Search};
 use crate::chaos::twin;
-use crate::engine::taylor::Watched;
+use crate::engine::taylor::{Compiled, Tangents, Watched};
 use crate::motion::Diverged;
 use shared_model::{InvalidScenario, Scenario};
 
@@ -192,7 +192,10 @@ fn by_engine<const K: usize>(
     method: Method,
     timing: Timing,
     watch: Watch,
-) -> Result<Vec<Option<Vec<Estimate>>>, InvalidScenario> {
+) -> Result<Vec<Option<Vec<Estimate>>>, InvalidScenario>
+where
+    Tangents<K>: Compiled<K>,
+{
     let watched = Watched::default();
     observe(scenarios, timing, watched, watch, |scenario, found| {
         let pieces = Pieces::<K>::of(found, timing.observed_s);

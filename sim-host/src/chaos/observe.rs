@@ -3,7 +3,7 @@
 use crate::chaos::fixed_step;
 use crate::chaos::lyapunov::{PIECES, WARM_UP};
 use crate::chaos::sweep::{Timing, Watch};
-use crate::engine::taylor::{Found, Motions, Span, Unfit, Watched};
+use crate::engine::taylor::{Compiled, Found, Motions, Span, Tangents, Unfit, Watched};
 use crate::motion::{Diverged, Motion};
 use shared_model::friction::FrictionLaw;
 use shared_model::{InvalidScenario, Scenario};
@@ -25,7 +25,10 @@ pub fn observe<const K: usize, R: Send>(
     watched: Watched,
     watch: Watch,
     see: impl Fn(&Scenario<f64>, &Found<K>) -> R + Sync,
-) -> Result<Vec<Option<R>>, InvalidScenario> {
+) -> Result<Vec<Option<R>>, InvalidScenario>
+where
+    Tangents<K>: Compiled<K>,
+{
     let (mut fit, mut unfit) = (Vec::new(), Vec::new());
     for (k, scenario) in scenarios.iter().enumerate() {
         let places = if is_fit(scenario)? {
@@ -74,7 +77,10 @@ pub(crate) fn follow<const K: usize>(
     scenarios: &[Scenario<f64>],
     timing: Timing,
     watched: Watched,
-) -> Result<Vec<Found<K>>, Unfit> {
+) -> Result<Vec<Found<K>>, Unfit>
+where
+    Tangents<K>: Compiled<K>,
+{
     let transient = Span {
         time_s: timing.transient_s,
         tolerance: TOLERANCE,

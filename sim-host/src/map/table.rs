@@ -20,6 +20,15 @@ use std::sync::Arc;
 /// Key of the file's metadata under which the plan is, as JSON.
 pub const PLAN_KEY: &str = "plan";
 
+/// Key of the CRC-32 of plan and cells as JSON: the format's own pages carry none.
+const CHECKSUM_KEY: &str = "crc32";
+const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
+fn checksum(plan: &Plan, cells: &[Cell]) -> anyhow::Result<String> {
+    let sum = CHECKSUM.checksum(&serde_json::to_vec(&(plan, cells))?);
+    Ok(format!("{sum:08x}"))
+}
+
 /// A column: its name, and the values of the cells.
 struct Column {
     name: &'static str,
@@ -45,10 +54,11 @@ pub fn write(plan: &Plan, cells: &[Cell], to: impl Write + Send) -> anyhow::Resu
     let schema = Type::group_type_builder("map")
         .with_fields(fields)
         .build()?;
+    let checksum = KeyValue::new(CHECKSUM_KEY.into(), checksum(plan, cells)?);
     let plan = KeyValue::new(PLAN_KEY.into(), serde_json::to_string(plan)?);
     let properties = WriterProperties::builder()
         .set_created_by(concat!("sim-host ", env!("CARGO_PKG_VERSION")).into())
-        .set_key_value_metadata(Some(vec![plan]))
+        .set_key_value_metadata(Some(vec![plan, checksum]))
         .build();
     let mut file = SerializedFileWriter::new(to, Arc::new(schema), Arc::new(properties))?;
     let mut rows = file.next_row_group()?;
@@ -65,6 +75,12 @@ pub fn write(plan: &Plan, cells: &[Cell], to: impl Write + Send) -> anyhow::Resu
 /// # Errors
 /// If it is no table that this version of the program has written, or a damaged one.
 pub fn read(from: File) -> anyhow::Result<(Plan, Vec<Cell>)> {
+    // Some damage makes the crate panic.
+    let table = std::panic::catch_unwind(|| read_whole(from));
+    table.unwrap_or_else(|_| bail!("it is damaged"))
+}
+
+fn read_whole(from: File) -> anyhow::Result<(Plan, Vec<Cell>)> {
     let none = "it is no Parquet file, or not a whole one";
     let table = SerializedFileReader::new(from).context(none)?;
     let plan = plan(table.metadata().file_metadata())?;
@@ -75,6 +91,11 @@ pub fn read(from: File) -> anyhow::Result<(Plan, Vec<Cell>)> {
         cells.iter().map(Cell::place).eq(places),
         "its rows are not the cells of its plan"
     );
+    let noted = noted(table.metadata().file_metadata(), CHECKSUM_KEY);
+    ensure!(
+        noted == Some(checksum(&plan, &cells)?.as_str()),
+        "it is damaged: its cells are not those that were written"
+    );
     Ok((plan, cells))
 }
 
@@ -84,10 +105,13 @@ struct MadeBy {
     version: String,
 }
 
-fn plan(metadata: &FileMetaData) -> anyhow::Result<Plan> {
+fn noted<'a>(metadata: &'a FileMetaData, key: &str) -> Option<&'a str> {
     let mut pairs = metadata.key_value_metadata().into_iter().flatten();
-    let plan = pairs.find(|pair| pair.key == PLAN_KEY);
-    let plan = plan.and_then(|pair| pair.value.as_deref());
+    pairs.find(|pair| pair.key == key)?.value.as_deref()
+}
+
+fn plan(metadata: &FileMetaData) -> anyhow::Result<Plan> {
+    let plan = noted(metadata, PLAN_KEY);
     let json = plan.context("it has no plan of a map in its metadata")?;
     let unreadable = "its plan cannot be read";
     let MadeBy { version } = serde_json::from_str(json).context(unreadable)?;
@@ -292,6 +316,23 @@ mod tests {
         let (plan, cells) = map();
         let read = read_back(&written(&plan, &cells)).unwrap();
         assert_eq!(read, (plan, cells));
+    }
+
+    /// Whatever bit flips, the file is refused or nothing has changed.
+    #[test]
+    fn no_damage_goes_unnoticed() {
+        let (plan, cells) = map();
+        let whole = written(&plan, &cells);
+        let mut refused = 0;
+        for bit in (0..8 * whole.len()).step_by(37) {
+            let mut damaged = whole.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            match read_back(&damaged) {
+                Ok(found) => assert_eq!(found, (plan.clone(), cells.clone()), "bit {bit}"),
+                Err(_) => refused += 1,
+            }
+        }
+        assert!(refused > 100, "{refused}");
     }
 
     #[test]

@@ -1,8 +1,11 @@
 //! The right-hand side with exact slip angles or the Magic Formula: no polynomial, but sines and arctangents have recurrences too.
 
 use super::expansion::{Chassis, Equation, Forces, Loads};
+use super::flight::{self, Flight};
 use super::lanes::Lanes;
+use super::motion::Span;
 use super::polynomial::slip_angles;
+use super::queue::Queue;
 use super::series::{Atan, ORDER, Series, SinCos, product};
 use super::tires::{Axle, CubicTires, MagicTires, offsets};
 use pulp::Simd;
@@ -15,6 +18,17 @@ pub(super) struct Analytic;
 
 impl Equation for Analytic {
     type Forces<S: Simd, const V: usize, const K: usize> = AnalyticForces<S, V, K>;
+
+    // One vector: the recurrences are long enough to hide their latencies.
+    #[inline(always)]
+    fn fly<'a, S: Simd, const K: usize>(
+        simd: S,
+        queue: &'a Queue<'a, K>,
+        span: &'a Span,
+        most: usize,
+    ) -> Vec<flight::Result<K>> {
+        Flight::<S, 1, K, Self>::new(simd, queue, span, most).run()
+    }
 }
 
 /// Series of the forces.

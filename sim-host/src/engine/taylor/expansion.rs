@@ -4,7 +4,10 @@
 //! is linear in the right-hand side (14) is here; the tyres' forces are in `polynomial` and `analytic`. Dry friction is a constant
 //! torque as long as its mode lasts. `tests` hold the recurrences against the shared model's derivative.
 
+use super::flight;
 use super::lanes::Lanes;
+use super::motion::Span;
+use super::queue::Queue;
 use super::series::{ORDER, Series};
 use pulp::Simd;
 use shared_model::dither::Injection;
@@ -139,6 +142,14 @@ pub(super) trait Forces<S: Simd, const V: usize, const K: usize> {
 pub(super) trait Equation {
     /// Its forces.
     type Forces<S: Simd, const V: usize, const K: usize>: Forces<S, V, K>;
+
+    /// Follows motions of the queue, up to `most` at once, in as many vectors side by side as suit the equation.
+    fn fly<'a, S: Simd, const K: usize>(
+        simd: S,
+        queue: &'a Queue<'a, K>,
+        span: &'a Span,
+        most: usize,
+    ) -> Vec<flight::Result<K>>;
 }
 
 /// The expansion of the motion about a state, with `K` tangent vectors.

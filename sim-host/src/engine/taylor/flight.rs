@@ -66,16 +66,8 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize, E: Equatio
 }
 
 impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, K, E> {
-    /// Up to `most` motions of the queue.
+    /// Up to `most` motions of the queue at once.
     pub fn new(simd: S, queue: &'a Queue<'a, K>, span: &'a Span, most: usize) -> Self {
-        let mut flight = Self::empty(simd, queue, span);
-        for lane in 0..most.min(Lanes::<S, V>::COUNT) {
-            flight.load_next(lane);
-        }
-        flight
-    }
-
-    fn empty(simd: S, queue: &'a Queue<'a, K>, span: &'a Span) -> Self {
         let splat = |number| Lanes::splat(simd, number);
         let like = queue.first();
         let mut flight = Self {
@@ -97,31 +89,25 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             stretch: [splat(1.0); K],
         };
         for lane in 0..Lanes::<S, V>::COUNT {
-            flight.set_numbers(lane, &Numbers::of_nobody());
+            if lane < most {
+                flight.load_next(lane);
+            } else {
+                flight.set_numbers(lane, &Numbers::of_nobody());
+            }
         }
         flight
     }
 
-    /// Takes over the motions of a flight with more lanes, of which no more have one than this has lanes.
-    pub fn taking_over<const W: usize>(mut wider: Flight<'a, S, W, K, E>) -> Self {
-        let mut flight = Self::empty(wider.simd, wider.queue, wider.span);
-        let aboard = (0..wider.lanes.len()).filter_map(|lane| wider.take(lane));
-        for (lane, motion) in aboard.enumerate() {
-            flight.load(lane, motion);
-        }
-        flight.results = wider.results;
-        flight
-    }
-
-    /// Goes on until no more than `fewest` motions are aboard.
+    /// Follows motions until none waits and none is aboard.
     #[inline(always)]
-    pub fn run(&mut self, fewest: usize) {
-        while self.aboard > fewest {
+    pub fn run(mut self) -> Vec<Result<K>> {
+        while self.aboard > 0 {
             self.step();
             if self.steps.is_multiple_of(STEPS_A_TURN) {
                 self.take_turns();
             }
         }
+        self.results
     }
 
     /// The last motions share the lanes by turns, so that none of them is left to go on alone at the end.
@@ -135,11 +121,6 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             self.queue.push(motion);
             self.load_next(self.turn);
         }
-    }
-
-    /// What was found of the motions at their ends.
-    pub fn results(self) -> Vec<Result<K>> {
-        self.results
     }
 
     #[inline(always)]
@@ -243,7 +224,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             }
             let most_s = step_s.as_slice()[lane];
             let begin_s = self.time_s(lane);
-            let polynomial = polynomial(&self.expansion.x[component], lane);
+            let path = polynomial(&self.expansion.x[component], lane);
             let tangent = match component {
                 YAW_RATE => self.expansion.tangents.first(),
                 _ => None,
@@ -255,8 +236,8 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             let Some(motion) = &mut self.lanes[lane] else {
                 continue;
             };
-            roots::roots(&derivative(&polynomial), most_s, |root_s| {
-                let turn = roots::value(&polynomial, root_s);
+            roots::roots(&derivative(&path), most_s, |root_s| {
+                let turn = roots::value(&path, root_s);
                 motion.found.turns[component].push((begin_s + root_s, turn));
                 motion.found.extend(component, turn);
                 if let Some(tangent) = tangent {
@@ -291,18 +272,17 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             }
             let most_s = step_s.as_slice()[lane];
             let begin_s = self.time_s(lane);
-            let polynomial = series.each_ref().map(|c| c.as_slice()[lane]);
-            let slope = derivative(&polynomial);
+            let height = polynomial(&series, lane);
+            let slope = derivative(&height);
             let x = &self.expansion.x;
-            let at =
-                |i: usize, t: f64| roots::value(&x[i].each_ref().map(|c| c.as_slice()[lane]), t);
-            let Some(lane) = &mut self.lanes[lane] else {
+            let Some(motion) = &mut self.lanes[lane] else {
                 continue;
             };
-            roots::roots(&polynomial, most_s, |root_s| {
-                lane.found.crossings.push(Crossing {
+            roots::roots(&height, most_s, |root_s| {
+                motion.found.crossings.push(Crossing {
                     time_s: begin_s + root_s,
-                    x: std::array::from_fn(|i| at(i, root_s)),
+                    x: x.each_ref()
+                        .map(|series| roots::value(&polynomial(series, lane), root_s)),
                     rising: roots::value(&slope, root_s) > 0.0,
                 });
             });

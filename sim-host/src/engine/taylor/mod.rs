@@ -21,5 +21,5 @@ mod roots;
 mod series;
 mod tires;
 
-pub use motion::{Crossing, Found, Growths, Motions, Span, Unfit, Watched};
+pub use motion::{Compiled, Crossing, Found, Growths, Motions, Span, Tangents, Unfit, Watched};
 pub use series::ORDER;

@@ -2,7 +2,7 @@
 
 use super::analytic::Analytic;
 use super::expansion::Equation;
-use super::flight::{self, Flight};
+use super::flight;
 use super::polynomial::Polynomial;
 use super::queue::Queue;
 use super::tires::offsets;
@@ -14,9 +14,6 @@ use shared_model::friction::Sign;
 use shared_model::vehicle::{Model, SlipForm, State};
 use shared_model::{InvalidScenario, Scenario};
 use std::marker::PhantomData;
-
-/// Vectors side by side: enough to hide the latency of a multiplication.
-const VECTORS: usize = 2;
 
 /// What is looked at on the way, beside the end. Each costs some percent.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -190,11 +187,13 @@ impl Motions {
     }
 
     /// Follows all for a span, with `K` tangent vectors each, on all threads. What is found is in the scenarios' order.
-    pub fn follow<const K: usize>(&self, span: &Span) -> Vec<Found<K>> {
-        self.follow_by(Arch::new(), span)
+    pub fn follow<const K: usize>(&self, span: &Span) -> Vec<Found<K>>
+    where
+        Tangents<K>: Compiled<K>,
+    {
+        Tangents::follow(self, Arch::new(), span)
     }
 
-    /// The same with a given instruction set.
     fn follow_by<const K: usize>(&self, arch: Arch, span: &Span) -> Vec<Found<K>> {
         let alike = self.tasks.chunk_by(|a, b| a.form() == b.form());
         let follow = |tasks: &[Task]| match tasks[0].form() {
@@ -209,6 +208,38 @@ impl Motions {
         for (task, found) in self.tasks.iter_mut().zip(found) {
             task.start = found.end;
         }
+    }
+}
+
+/// A number of tangent vectors.
+#[derive(Debug)]
+pub struct Tangents<const K: usize>;
+
+/// A number of tangent vectors for which this crate has the engine's code: a minute's work of the compiler, which is not to be done
+/// again wherever the engine is called.
+pub trait Compiled<const K: usize> {
+    /// Follows motions with a given instruction set.
+    fn follow(motions: &Motions, arch: Arch, span: &Span) -> Vec<Found<K>>;
+}
+
+impl Compiled<0> for Tangents<0> {
+    #[inline(never)]
+    fn follow(motions: &Motions, arch: Arch, span: &Span) -> Vec<Found<0>> {
+        motions.follow_by(arch, span)
+    }
+}
+
+impl Compiled<1> for Tangents<1> {
+    #[inline(never)]
+    fn follow(motions: &Motions, arch: Arch, span: &Span) -> Vec<Found<1>> {
+        motions.follow_by(arch, span)
+    }
+}
+
+impl Compiled<4> for Tangents<4> {
+    #[inline(never)]
+    fn follow(motions: &Motions, arch: Arch, span: &Span) -> Vec<Found<4>> {
+        motions.follow_by(arch, span)
     }
 }
 
@@ -245,13 +276,7 @@ impl<E: Equation, const K: usize> WithSimd for Fly<'_, E, K> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let (queue, span, most) = (self.queue, self.span, self.most);
-        let mut flight = Flight::<S, VECTORS, K, E>::new(simd, queue, span, most);
-        flight.run(S::F64_LANES);
-        // The last ones fit into one vector.
-        let mut last = Flight::<S, 1, K, E>::taking_over(flight);
-        last.run(0);
-        last.results()
+        E::fly(simd, self.queue, self.span, self.most)
     }
 }
 
@@ -305,20 +330,24 @@ mod tests {
     fn bits_are_the_same_on_every_path_and_in_every_company() {
         let scenarios = scenarios();
         let motions = Motions::new(&scenarios).expect("all fit");
-        let portable = motions.follow_by::<2>(Arch::Scalar, &span());
+        let portable = Tangents::<4>::follow(&motions, Arch::Scalar, &span());
         let v3 = V3::try_new().map(Arch::V3);
         let v4 = V4::try_new().map(Arch::V4);
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("threads can be started").install(|| {
                 for arch in [v3, v4].into_iter().flatten() {
-                    assert_eq!(motions.follow_by::<2>(arch, &span()), portable, "{arch:?}");
+                    assert_eq!(
+                        Tangents::<4>::follow(&motions, arch, &span()),
+                        portable,
+                        "{arch:?}"
+                    );
                 }
             });
         }
         let alone = |scenario: &Scenario<f64>| {
             let motion = Motions::new(std::slice::from_ref(scenario)).expect("it fits");
-            motion.follow::<2>(&span()).remove(0)
+            motion.follow::<4>(&span()).remove(0)
         };
         assert_eq!(scenarios.iter().map(alone).collect::<Vec<_>>(), portable);
         assert!(portable[7].diverged.is_some());

@@ -1,7 +1,10 @@
 //! The right-hand side with cubic tyres at small slip angles: a polynomial.
 
 use super::expansion::{Chassis, Equation, Forces, Loads};
+use super::flight::{self, Flight};
 use super::lanes::Lanes;
+use super::motion::Span;
+use super::queue::Queue;
 use super::series::{ORDER, Series, product};
 use super::tires::{Axle, CubicTires};
 use pulp::Simd;
@@ -14,6 +17,17 @@ pub(super) struct Polynomial;
 
 impl Equation for Polynomial {
     type Forces<S: Simd, const V: usize, const K: usize> = PolynomialForces<S, V, K>;
+
+    // Two vectors: enough to hide the latency of a multiplication.
+    #[inline(always)]
+    fn fly<'a, S: Simd, const K: usize>(
+        simd: S,
+        queue: &'a Queue<'a, K>,
+        span: &'a Span,
+        most: usize,
+    ) -> Vec<flight::Result<K>> {
+        Flight::<S, 2, K, Self>::new(simd, queue, span, most).run()
+    }
 }
 
 /// Series of the forces.
