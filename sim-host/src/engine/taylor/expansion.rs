@@ -196,7 +196,8 @@ impl<S: Simd, const V: usize, const K: usize, F: Forces<S, V, K>> Expansion<S, V
     /// Works out all coefficients from those of order 0, which are the state and the tangent vectors.
     #[inline(always)]
     pub fn expand(&mut self) {
-        if !F::UNROLLED {
+        // Where it pays: a spectrum's code, and plain numbers', would keep the compiler busy for longer than it saves.
+        if !F::UNROLLED || K > 1 || S::F64_LANES == 1 {
             for n in 0..ORDER {
                 self.advance(n);
             }

@@ -5,8 +5,8 @@ use super::guard::{Guards, RELEASE_MARGIN};
 use super::lanes::Lanes;
 use super::motion::{Crossing, Found, Span};
 use super::queue::{LONGEST_STEP_S, Motion, Numbers, Queue, Waiting};
-use super::roots::{self, Polynomial, derivative};
-use super::series::{ORDER, Series, value};
+use super::roots::{self, derivative};
+use super::series::{ORDER, Series, of_lane, value};
 use crate::engine::events::{Guard, next_mode};
 use crate::motion::Diverged;
 use crate::trace::BOUND;
@@ -19,6 +19,8 @@ use shared_model::vehicle::{STEERING_RATE, State, YAW_RATE};
 const SHORTEST_STEP_S: f64 = 1e-9;
 /// Factor by which a step shrinks until it meets the tolerance, and its inverse by which it grows where that would have met it.
 const SHRINK: f64 = 0.92;
+/// Factors tried without asking whether they are needed: the processor would rather try than guess.
+const USUAL_SHRINKS: usize = 3;
 /// Factors tried before a step is given up.
 const MOST_SHRINKS: usize = 300;
 /// A rate of change below this (in the component's unit a second) is rounding, which has turning points of its own.
@@ -168,8 +170,8 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         let last = greatest(&self.expansion.x, ORDER);
         let mut step_s = self.step_s;
         let mut error = last * power(step_s);
-        for _ in 0..MOST_SHRINKS {
-            if error.all_less(tolerance) {
+        for tried in 0..MOST_SHRINKS {
+            if tried >= USUAL_SHRINKS && error.all_less(tolerance) {
                 break;
             }
             step_s = error.select_less(tolerance, step_s, step_s.scale(SHRINK));
@@ -192,10 +194,10 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         if room.zero().all_less(room) {
             return;
         }
-        for lane in 0..Lanes::<S, V>::COUNT {
-            if room.as_slice()[lane] > 0.0 || self.lanes[lane].is_none() {
-                continue;
-            }
+        let mut rest = room.not_above_zero();
+        while rest != 0 {
+            let lane = rest.trailing_zeros() as usize;
+            rest &= rest - 1;
             let most_s = &mut step_s.as_mut_slice()[lane];
             if let Some((instant_s, bound)) = self.guards.first_end(lane, x, force, *most_s) {
                 *most_s = instant_s;
@@ -224,7 +226,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             }
             let most_s = step_s.as_slice()[lane];
             let begin_s = self.time_s(lane);
-            let path = polynomial(&self.expansion.x[component], lane);
+            let path = of_lane(&self.expansion.x[component], lane);
             let tangent = match component {
                 YAW_RATE => self.expansion.tangents.first(),
                 _ => None,
@@ -236,7 +238,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             let Some(motion) = &mut self.lanes[lane] else {
                 continue;
             };
-            roots::roots(&derivative(&path), most_s, |root_s| {
+            roots::roots(&derivative(&path), most_s, |root_s, _| {
                 let turn = roots::value(&path, root_s);
                 motion.found.turns[component].push((begin_s + root_s, turn));
                 motion.found.extend(component, turn);
@@ -272,18 +274,17 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             }
             let most_s = step_s.as_slice()[lane];
             let begin_s = self.time_s(lane);
-            let height = polynomial(&series, lane);
-            let slope = derivative(&height);
+            let height = of_lane(&series, lane);
             let x = &self.expansion.x;
             let Some(motion) = &mut self.lanes[lane] else {
                 continue;
             };
-            roots::roots(&height, most_s, |root_s| {
+            roots::roots(&height, most_s, |root_s, rising| {
                 motion.found.crossings.push(Crossing {
                     time_s: begin_s + root_s,
                     x: x.each_ref()
-                        .map(|series| roots::value(&polynomial(series, lane), root_s)),
-                    rising: roots::value(&slope, root_s) > 0.0,
+                        .map(|series| roots::value(&of_lane(series, lane), root_s)),
+                    rising,
                 });
             });
         }
@@ -580,22 +581,12 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
     }
 }
 
-/// The polynomial of one lane.
-#[inline(always)]
-fn polynomial<S: Simd, const V: usize>(series: &Series<S, V>, lane: usize) -> Polynomial {
-    let mut polynomial = [0.0; ORDER + 1];
-    for k in 0..=ORDER {
-        polynomial[k] = series[k].as_slice()[lane];
-    }
-    polynomial
-}
-
 /// Logarithm of the length of one lane's tangent vector, `t` from the step's beginning.
 #[inline(always)]
 fn log_length<S: Simd, const V: usize>(tangent: &[Series<S, V>; 4], lane: usize, t: f64) -> f64 {
     let mut square = 0.0;
     for series in tangent {
-        square += roots::value(&polynomial(series, lane), t).powi(2);
+        square += roots::value(&of_lane(series, lane), t).powi(2);
     }
     0.5 * square.ln()
 }

@@ -1,8 +1,8 @@
 //! Where friction modes end: a quantity of each lane that must stay within bounds, on the step's polynomials.
 
 use super::lanes::Lanes;
-use super::roots;
-use super::series::{ORDER, Series};
+use super::roots::{self, Polynomial};
+use super::series::{ORDER, Series, of_lane};
 use crate::engine::events::Guard;
 use pulp::Simd;
 use shared_model::dither::Injection;
@@ -114,33 +114,34 @@ impl<S: Simd, const V: usize> Guards<Lanes<S, V>> {
         force: &Series<S, V>,
         most_s: f64,
     ) -> Option<(f64, f64)> {
+        let mut path = of_lane(argument, lane);
         let per_force = self.per_force.as_slice()[lane];
-        let mut path = [0.0; ORDER + 1];
-        for k in 0..ORDER {
-            let argument = argument[k].as_slice()[lane];
-            path[k] = per_force.mul_add(force[k].as_slice()[lane], argument);
+        if per_force != 0.0 {
+            for k in 0..ORDER {
+                path[k] = per_force.mul_add(force[k].as_slice()[lane], path[k]);
+            }
         }
-        path[ORDER] = argument[ORDER].as_slice()[lane];
-        let mut first: Option<(f64, f64)> = None;
-        for (bounds, sign) in [(&self.lower, 1.0), (&self.upper, -1.0)] {
-            let bound = bounds.as_slice()[lane];
-            if !bound.is_finite() {
-                continue;
+        let (lower, upper) = (self.lower.as_slice()[lane], self.upper.as_slice()[lane]);
+        let mut first = None;
+        let mut until_s = most_s;
+        // One of them, usually the only one; then the other.
+        let mut sign = if lower.is_finite() { 1.0 } else { -1.0 };
+        loop {
+            let bound = if sign > 0.0 { lower } else { upper };
+            let mut room = [0.0; ORDER + 1];
+            room[0] = sign * (path[0] - bound);
+            for k in 1..ORDER + 1 {
+                room[k] = sign * path[k];
             }
-            let mut room = path;
-            room[0] -= bound;
-            for k in 0..=ORDER {
-                room[k] *= sign;
-            }
-            let until = match first {
-                Some((instant_s, _)) => instant_s,
-                None => most_s,
-            };
-            if let Some(instant_s) = first_fall(room, until) {
+            if let Some(instant_s) = first_fall(room, until_s) {
                 first = Some((instant_s, bound));
+                until_s = instant_s;
             }
+            if sign < 0.0 || !upper.is_finite() {
+                return first;
+            }
+            sign = -1.0;
         }
-        first
     }
 }
 
@@ -188,23 +189,25 @@ impl<S: Simd, const V: usize> Path<Lanes<S, V>> {
     }
 }
 
-/// The first instant in (0, `most_s`] at which a polynomial goes from positive to negative; one that begins at zero counts from the
-/// shortest time of a mode on.
+/// The first instant in (0, `most_s`] at which a polynomial goes from positive to negative, but not before the shortest time of a
+/// mode.
 #[inline(always)]
-fn first_fall(mut room: [f64; ORDER + 1], most_s: f64) -> Option<f64> {
+fn first_fall(mut room: Polynomial, most_s: f64) -> Option<f64> {
     let soon_s = SHORTEST_MODE_S.min(most_s);
     if room[0] == 0.0 {
         // On the bound: the root at the beginning is the last change of mode.
-        room.rotate_left(1);
+        for k in 0..ORDER {
+            room[k] = room[k + 1];
+        }
+        room[ORDER] = 0.0;
     }
-    if roots::value(&room, soon_s) < 0.0 {
+    if room[0] < 0.0 && roots::value(&room, soon_s) < 0.0 {
         return Some(soon_s);
     }
-    let slope = roots::derivative(&room);
     let mut first = None;
-    roots::roots(&room, most_s, |root_s| {
-        if root_s > soon_s && roots::value(&slope, root_s) < 0.0 {
-            first.get_or_insert(root_s);
+    roots::roots(&room, most_s, |root_s, rising| {
+        if !rising {
+            first.get_or_insert(root_s.max(soon_s));
         }
     });
     first

@@ -62,6 +62,16 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
         bytemuck::cast_slice_mut(&mut self.vectors)
     }
 
+    /// Bit by bit, the lanes without a number above zero.
+    #[inline(always)]
+    pub fn not_above_zero(&self) -> u32 {
+        let mut bits = 0;
+        for (lane, number) in self.as_slice().iter().enumerate() {
+            bits |= u32::from(!(*number > 0.0)) << lane;
+        }
+        bits
+    }
+
     /// `self * factor + sum`, rounded once.
     #[inline(always)]
     pub fn mul_add(self, factor: Self, sum: Self) -> Self {
@@ -115,16 +125,24 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
         result
     }
 
-    /// The lesser of two; not a number where `other` is none.
+    /// The lesser of two numbers.
     #[inline(always)]
     pub fn min(self, other: Self) -> Self {
-        self.select_less(other, self, other)
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.min_f64s(self.vectors[v], other.vectors[v]);
+        }
+        result
     }
 
-    /// The greater of two; not a number where `other` is none.
+    /// The greater of two numbers.
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
-        other.select_less(self, self, other)
+        let mut result = self;
+        for v in 0..V {
+            result.vectors[v] = self.simd.max_f64s(self.vectors[v], other.vectors[v]);
+        }
+        result
     }
 
     /// `yes` where this is less than `bound`, elsewhere `no`.

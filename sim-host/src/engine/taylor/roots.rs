@@ -27,29 +27,62 @@ pub(super) fn value(polynomial: &Polynomial, t: f64) -> f64 {
 /// Coefficients of the derivative.
 #[inline(always)]
 pub(super) fn derivative(polynomial: &Polynomial) -> Polynomial {
-    std::array::from_fn(|k| match polynomial.get(k + 1) {
-        Some(c) => (k + 1) as f64 * c,
-        None => 0.0,
-    })
+    let mut rate = [0.0; ORDER + 1];
+    for k in 0..ORDER {
+        rate[k] = (k + 1) as f64 * polynomial[k + 1];
+    }
+    rate
 }
 
-/// Shows `see` the roots within (0, `end`], ascending, by Bernstein's form: the signs of its coefficients bound the number of
-/// roots, and where they leave open how many there are, the interval is halved. Roots where the sign does not change may be
-/// left out.
+/// A polynomial at an instant.
+#[derive(Clone, Copy)]
+struct Point {
+    t: f64,
+    value: f64,
+    rate: f64,
+}
+
+impl Point {
+    #[inline(always)]
+    fn at(polynomial: &Polynomial, rate: &Polynomial, t: f64) -> Self {
+        Self {
+            t,
+            value: value(polynomial, t),
+            rate: value(rate, t),
+        }
+    }
+
+    #[inline(always)]
+    fn is_below(&self) -> bool {
+        self.value < 0.0
+    }
+}
+
+/// Shows `see` the roots within (0, `end`], ascending, each with whether the polynomial rises there. By Bernstein's form: the signs
+/// of its coefficients bound the number of roots, and where they leave open how many there are, the interval is halved. Roots
+/// where the sign does not change may be left out.
 #[inline(always)]
-pub(super) fn roots(polynomial: &Polynomial, end: f64, mut see: impl FnMut(f64)) {
-    if is_monotone(&derivative(polynomial), end) {
-        if (polynomial[0] < 0.0) != (value(polynomial, end) < 0.0) {
-            see(refine(polynomial, 0.0, end));
+pub(super) fn roots(polynomial: &Polynomial, end: f64, mut see: impl FnMut(f64, bool)) {
+    let rate = derivative(polynomial);
+    let begin = Point {
+        t: 0.0,
+        value: polynomial[0],
+        rate: rate[0],
+    };
+    let last = Point::at(polynomial, &rate, end);
+    if is_monotone(&rate, end) {
+        if begin.is_below() != last.is_below() {
+            see(refine(polynomial, &rate, begin, last), begin.is_below());
         }
         return;
     }
-    let bernstein = to_bernstein(polynomial, end);
+    let bernstein = to_bernstein(*polynomial, end);
     match sign_changes(&bernstein) {
         0 => {}
-        1 => see(refine(polynomial, 0.0, end)),
+        1 => see(refine(polynomial, &rate, begin, last), begin.is_below()),
         _ => isolate(&bernstein, 0.0, 1.0, &mut |from, to| {
-            see(refine(polynomial, from * end, to * end));
+            let [from, to] = [from, to].map(|share| Point::at(polynomial, &rate, share * end));
+            see(refine(polynomial, &rate, from, to), from.is_below());
         }),
     }
 }
@@ -57,14 +90,17 @@ pub(super) fn roots(polynomial: &Polynomial, end: f64, mut see: impl FnMut(f64))
 /// The linear term outweighs all others within (0, `end`), given the derivative: the usual case, in which there is at most one
 /// root.
 #[inline(always)]
-fn is_monotone(slope: &Polynomial, end: f64) -> bool {
-    let mut others = slope.map(f64::abs);
-    others[0] = 0.0;
-    slope[0].abs() > value(&others, end)
+fn is_monotone(rate: &Polynomial, end: f64) -> bool {
+    let mut others = [0.0; ORDER + 1];
+    for k in 1..ORDER {
+        others[k] = rate[k].abs();
+    }
+    rate[0].abs() > value(&others, end)
 }
 
 /// Coefficients in Bernstein's basis of degree ORDER on [0, `end`].
-fn to_bernstein(polynomial: &Polynomial, end: f64) -> Polynomial {
+#[inline(never)]
+fn to_bernstein(polynomial: Polynomial, end: f64) -> Polynomial {
     // b_i = sum over j <= i of C(i, j)/C(n, j) a_j end^j.
     let mut power = 1.0;
     let mut binomial = 1.0;
@@ -124,26 +160,26 @@ fn halves(bernstein: &Polynomial) -> (Polynomial, Polynomial) {
     (left, row)
 }
 
-/// The root between two signs, by Newton from the chord's root within its bracket, and bisection where that leaves it.
+/// The root between two signs, by Newton from the inverse's cubic within its bracket, and bisection where that leaves it.
 #[inline(always)]
-fn refine(polynomial: &Polynomial, from: f64, to: f64) -> f64 {
-    let rate = derivative(polynomial);
-    let (mut low, mut high) = (from, to);
-    let (first, last) = (value(polynomial, low), value(polynomial, high));
-    let begins_negative = first < 0.0;
-    let mut t = low + (high - low) * (first / (first - last));
+fn refine(polynomial: &Polynomial, rate: &Polynomial, begin: Point, end: Point) -> f64 {
+    let (mut low, mut high) = (begin.t, end.t);
+    let mut t = inverse_at_zero(begin, end);
+    if !(t > low && t < high) {
+        t = 0.5 * (low + high);
+    }
     let mut move_before = 0.0;
     for _ in 0..MOST_ITERATIONS {
-        let (at, slope) = (value(polynomial, t), value(&rate, t));
-        if at == 0.0 {
+        let here = Point::at(polynomial, rate, t);
+        if here.value == 0.0 {
             return t;
         }
-        if (at < 0.0) == begins_negative {
+        if here.is_below() == begin.is_below() {
             low = t;
         } else {
             high = t;
         }
-        let newton = t - at / slope;
+        let newton = t - here.value / here.rate;
         if !(newton > low && newton < high) {
             t = 0.5 * (low + high);
             move_before = 0.0;
@@ -152,13 +188,24 @@ fn refine(polynomial: &Polynomial, from: f64, to: f64) -> f64 {
         let moved = newton - t;
         t = newton;
         // Moves square, times a factor that two of them tell: the next one would be rounding.
-        let ends = moved * moved * moved.abs() <= f64::EPSILON * to * move_before;
-        if ends || moved.abs() <= f64::EPSILON * to {
+        let ends = moved * moved * moved.abs() <= f64::EPSILON * end.t * move_before;
+        if ends || moved.abs() <= f64::EPSILON * end.t {
             return t;
         }
         move_before = moved * moved;
     }
     t
+}
+
+/// Where the cubic with the inverse's values and rates at both ends is at zero.
+#[inline(always)]
+fn inverse_at_zero(begin: Point, end: Point) -> f64 {
+    let rise = end.value - begin.value;
+    let share = -begin.value / rise;
+    let rest = 1.0 - share;
+    let ends = share * share * rest.mul_add(2.0, 1.0) * (end.t - begin.t);
+    let slopes = rest * (1.0 / begin.rate) - share * (1.0 / end.rate);
+    (share * rest * rise).mul_add(slopes, ends) + begin.t
 }
 
 #[cfg(test)]
@@ -182,7 +229,7 @@ mod tests {
 
     fn found(polynomial: &Polynomial, end: f64) -> Vec<f64> {
         let mut all = Vec::new();
-        roots(polynomial, end, |root| all.push(root));
+        roots(polynomial, end, |root, _| all.push(root));
         all
     }
 

@@ -10,6 +10,19 @@ pub const ORDER: usize = 12;
 /// Coefficients 0 to `ORDER` of one quantity.
 pub(super) type Series<S, const V: usize> = [Lanes<S, V>; ORDER + 1];
 
+/// Coefficients of one lane.
+#[inline(always)]
+pub(super) fn of_lane<S: Simd, const V: usize>(
+    series: &Series<S, V>,
+    lane: usize,
+) -> [f64; ORDER + 1] {
+    let mut coefficients = [0.0; ORDER + 1];
+    for k in 0..ORDER + 1 {
+        coefficients[k] = series[k].as_slice()[lane];
+    }
+    coefficients
+}
+
 /// Coefficient `n` of the product of two series. The terms that were known last are added last: the processor has added the
 /// others by then.
 #[inline(always)]
