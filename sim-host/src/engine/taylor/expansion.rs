@@ -1,13 +1,12 @@
 //! Taylor coefficients of the motion, many motions side by side.
 //!
 //! Each coefficient follows from those before it by sums of products (A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99). What
-//! is linear in the right-hand side (14) is here; the tyres' forces are in `polynomial` and `analytic`. Dry friction is a constant
+//! is linear in the right-hand side (14) is here; the tyres' forces are in `forces`. Dry friction is a constant
 //! torque as long as its mode lasts. `tests` hold the recurrences against the shared model's derivative.
 
-use super::flight;
+use super::equation::Equation;
+use super::forces::{Forces, Loads};
 use super::lanes::Lanes;
-use super::motion::Span;
-use super::queue::Queue;
 use super::series::{ORDER, Series};
 use pulp::Simd;
 use shared_model::dither::Injection;
@@ -21,8 +20,9 @@ pub(super) struct Chassis<L> {
     /// Negative: behind the centre of gravity.
     pub rear_lever_s: L,
     lateral_gain: L,
-    front_yaw_gain: L,
-    rear_yaw_gain: L,
+    pub front_yaw_gain: L,
+    /// Negative.
+    pub rear_yaw_gain: L,
 }
 
 impl<S: Simd, const V: usize> Chassis<Lanes<S, V>> {
@@ -84,86 +84,18 @@ impl<S: Simd, const V: usize> Steering<Lanes<S, V>> {
     }
 }
 
-/// Coefficients of what the tyres do.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Loads<L> {
-    /// Cornering forces, N.
-    front: L,
-    rear: L,
-    /// Yaw acceleration, rad/s^2.
-    pub yaw: L,
-}
-
-impl<S: Simd, const V: usize> Loads<Lanes<S, V>> {
-    /// Of forces at a right angle to the chassis.
-    #[inline(always)]
-    pub fn straight(chassis: &Chassis<Lanes<S, V>>, front: Lanes<S, V>, rear: Lanes<S, V>) -> Self {
-        let yaw = front.mul_add(chassis.front_yaw_gain, rear * chassis.rear_yaw_gain);
-        Self { front, rear, yaw }
-    }
-}
-
-/// Series of the tyres' forces, in which the right-hand side is not linear.
-pub(super) trait Forces<S: Simd, const V: usize, const K: usize> {
-    /// Whether every order gets instructions of its own, without loops.
-    const UNROLLED: bool;
-
-    /// Room for those of motions like this one; no motion in any lane.
-    fn new(simd: S, model: &Model<f64>, injection: Injection<f64>) -> Self;
-
-    /// Puts a motion's tyres into its lane.
-    fn set_lane(&mut self, lane: usize, model: &Model<f64>, injection: Injection<f64>);
-
-    /// No forces in a lane.
-    fn free_lane(&mut self, lane: usize);
-
-    /// Coefficient `n`, given the state's up to `n`.
-    fn load(
-        &mut self,
-        n: usize,
-        chassis: &Chassis<Lanes<S, V>>,
-        x: &[Series<S, V>; 4],
-    ) -> Loads<Lanes<S, V>>;
-
-    /// Coefficient `n` of its change along tangent vector `k`, given the vector's up to `n`. After that of the state.
-    fn load_tangent(
-        &mut self,
-        n: usize,
-        k: usize,
-        chassis: &Chassis<Lanes<S, V>>,
-        tangent: &[Series<S, V>; 4],
-    ) -> Loads<Lanes<S, V>>;
-
-    /// Series of the front tyres' force, up to the coefficient before the last.
-    fn front_force(&self) -> &Series<S, V>;
-}
-
-/// A kind of right-hand side.
-pub(super) trait Equation {
-    /// Its forces.
-    type Forces<S: Simd, const V: usize, const K: usize>: Forces<S, V, K>;
-
-    /// Follows motions of the queue, up to `most` at once, in as many vectors side by side as suit the equation.
-    fn fly<'a, S: Simd, const K: usize>(
-        simd: S,
-        queue: &'a Queue<'a, K>,
-        span: &'a Span,
-        most: usize,
-    ) -> Vec<flight::Result<K>>;
-}
-
 /// The expansion of the motion about a state, with `K` tangent vectors.
-pub(super) struct Expansion<S: Simd, const V: usize, const K: usize, F> {
+pub(super) struct Expansion<S: Simd, const V: usize, const K: usize, E: Equation> {
     /// The state.
     pub x: [Series<S, V>; 4],
     /// The tangent vectors.
     pub tangents: [[Series<S, V>; 4]; K],
     chassis: Chassis<Lanes<S, V>>,
     steering: Steering<Lanes<S, V>>,
-    pub forces: F,
+    pub forces: Forces<S, V, K, E>,
 }
 
-impl<S: Simd, const V: usize, const K: usize, F: Forces<S, V, K>> Expansion<S, V, K, F> {
+impl<S: Simd, const V: usize, const K: usize, E: Equation> Expansion<S, V, K, E> {
     /// Room for expansions of motions like this one; no motion in any lane.
     pub fn new(simd: S, model: &Model<f64>, injection: Injection<f64>) -> Self {
         let zero = [Lanes::splat(simd, 0.0); ORDER + 1];
@@ -172,7 +104,7 @@ impl<S: Simd, const V: usize, const K: usize, F: Forces<S, V, K>> Expansion<S, V
             tangents: [[zero; 4]; K],
             chassis: Chassis::still(simd),
             steering: Steering::still(simd),
-            forces: F::new(simd, model, injection),
+            forces: Forces::new(simd, model, injection),
         }
     }
 
@@ -196,8 +128,8 @@ impl<S: Simd, const V: usize, const K: usize, F: Forces<S, V, K>> Expansion<S, V
     /// Works out all coefficients from those of order 0, which are the state and the tangent vectors.
     #[inline(always)]
     pub fn expand(&mut self) {
-        // Where it pays: a spectrum's code, and plain numbers', would keep the compiler busy for longer than it saves.
-        if !F::UNROLLED || K > 1 || S::F64_LANES == 1 {
+        // One number at a time gains little by it, and costs the compiler as much.
+        if !E::UNROLLED || S::F64_LANES == 1 {
             for n in 0..ORDER {
                 self.advance(n);
             }
@@ -257,8 +189,7 @@ fn advance<S: Simd, const V: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::analytic::Analytic;
-    use super::super::polynomial::Polynomial;
+    use super::super::equation::{Analytic, Polynomial};
     use super::*;
     use nalgebra::Vector4;
     use proptest::prelude::*;
@@ -357,8 +288,7 @@ mod tests {
         tangent: &Vector4<f64>,
     ) -> [Coefficients; 2] {
         let simd = Scalar::new();
-        let mut expansion =
-            Expansion::<Scalar, 1, 1, E::Forces<Scalar, 1, 1>>::new(simd, model, *injection);
+        let mut expansion = Expansion::<Scalar, 1, 1, E>::new(simd, model, *injection);
         expansion.set_lane(0, model, *injection);
         expansion.set_mode(0, model, mode);
         for i in 0..4 {

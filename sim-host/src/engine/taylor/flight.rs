@@ -1,6 +1,7 @@
 //! The steps: many motions in lanes, each with its own time.
 
-use super::expansion::{Equation, Expansion, Forces};
+use super::equation::Equation;
+use super::expansion::Expansion;
 use super::guard::{Guards, RELEASE_MARGIN};
 use super::lanes::Lanes;
 use super::motion::{Crossing, Found, Span};
@@ -55,7 +56,7 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize, E: Equatio
     results: Vec<Result<K>>,
     /// Index of the friction law's argument in a state, if a mode can end at all.
     argument: Option<usize>,
-    expansion: Expansion<S, V, K, E::Forces<S, V, K>>,
+    expansion: Expansion<S, V, K, E>,
     guards: Guards<Lanes<S, V>>,
     /// The step that the tolerance allows, s.
     step_s: Lanes<S, V>,
@@ -194,7 +195,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         if room.zero().all_less(room) {
             return;
         }
-        let mut rest = room.not_above_zero();
+        let mut rest = room.at_most_zero();
         while rest != 0 {
             let lane = rest.trailing_zeros() as usize;
             rest &= rest - 1;

@@ -62,12 +62,12 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
         bytemuck::cast_slice_mut(&mut self.vectors)
     }
 
-    /// Bit by bit, the lanes without a number above zero.
+    /// Lanes with a number of at most zero, a bit each.
     #[inline(always)]
-    pub fn not_above_zero(&self) -> u32 {
+    pub fn at_most_zero(&self) -> u32 {
         let mut bits = 0;
-        for (lane, number) in self.as_slice().iter().enumerate() {
-            bits |= u32::from(!(*number > 0.0)) << lane;
+        for lane in 0..Self::COUNT {
+            bits |= u32::from(self.as_slice()[lane] <= 0.0) << lane;
         }
         bits
     }

@@ -9,13 +9,14 @@
 // An iterator's closures are not always inlined, and then not compiled for the instruction set: see `lanes`.
 #![allow(clippy::needless_range_loop)]
 
-mod analytic;
+mod angles;
+mod equation;
 mod expansion;
 mod flight;
+mod forces;
 mod guard;
 mod lanes;
 mod motion;
-mod polynomial;
 mod queue;
 mod roots;
 mod series;

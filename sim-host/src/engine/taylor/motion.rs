@@ -1,9 +1,7 @@
 //! What is asked of the engine, and what it finds.
 
-use super::analytic::Analytic;
-use super::expansion::Equation;
+use super::equation::{Analytic, Equation, Polynomial};
 use super::flight;
-use super::polynomial::Polynomial;
 use super::queue::Queue;
 use super::tires::offsets;
 use crate::motion::Diverged;

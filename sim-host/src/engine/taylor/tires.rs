@@ -4,7 +4,7 @@ use super::lanes::Lanes;
 use super::series::{Atan, ORDER, Series, SinCos, inner_product, inner_square, product};
 use pulp::Simd;
 use shared_model::dither::Injection;
-use shared_model::tire::{CubicTire, MagicFormula, Tire};
+use shared_model::tire::{MagicFormula, Tire};
 
 /// Series of one axle.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +27,21 @@ impl<S: Simd, const V: usize> Axle<S, V> {
     }
 }
 
+/// The tyres of one axle.
+pub(super) trait Tires<S: Simd, const V: usize> {
+    /// No tyre in any lane, with room for tyres like this one under a dither.
+    fn new(simd: S, like: &Tire<f64>, injection: Injection<f64>) -> Self;
+
+    /// Puts a tyre into a lane, of the kind that there is room for.
+    fn set_lane(&mut self, lane: usize, tire: &Tire<f64>, injection: Injection<f64>);
+
+    /// Takes a lane's tyre off.
+    fn free_lane(&mut self, lane: usize);
+
+    /// Coefficient `n` of the force, and of its slope if that is asked for, given the slip angle's up to `n`.
+    fn load(&mut self, n: usize, axle: &mut Axle<S, V>, with_slope: bool);
+}
+
 /// Cubic tyres, softened by the mean of a dither: F = alpha (k1 - k2 alpha^2), dF/dalpha = k1 - 3 k2 alpha^2.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CubicTires<S: Simd, const V: usize> {
@@ -37,9 +52,8 @@ pub(super) struct CubicTires<S: Simd, const V: usize> {
     secant: Series<S, V>,
 }
 
-impl<S: Simd, const V: usize> CubicTires<S, V> {
-    /// No tyre in any lane.
-    pub fn new(simd: S) -> Self {
+impl<S: Simd, const V: usize> Tires<S, V> for CubicTires<S, V> {
+    fn new(simd: S, _: &Tire<f64>, _: Injection<f64>) -> Self {
         let zero = Lanes::splat(simd, 0.0);
         Self {
             linear: zero,
@@ -48,24 +62,22 @@ impl<S: Simd, const V: usize> CubicTires<S, V> {
         }
     }
 
-    /// Puts a tyre into a lane.
-    pub fn set_lane(&mut self, lane: usize, tire: &CubicTire<f64>, injection: Injection<f64>) {
-        let tire = tire.averaged(injection);
-        self.linear.as_mut_slice()[lane] = tire.linear_n_per_rad;
-        self.cubic.as_mut_slice()[lane] = -tire.cubic_n_per_rad3;
+    fn set_lane(&mut self, lane: usize, tire: &Tire<f64>, injection: Injection<f64>) {
+        if let Tire::Cubic(tire) = tire {
+            let tire = tire.averaged(injection);
+            self.linear.as_mut_slice()[lane] = tire.linear_n_per_rad;
+            self.cubic.as_mut_slice()[lane] = -tire.cubic_n_per_rad3;
+        }
     }
 
-    /// Takes a lane's tyre off.
-    pub fn free_lane(&mut self, lane: usize) {
+    fn free_lane(&mut self, lane: usize) {
         self.linear.as_mut_slice()[lane] = 0.0;
         self.cubic.as_mut_slice()[lane] = 0.0;
     }
 
-    /// Coefficient `n` of force and slope.
-    ///
-    /// What the slip angle's newest coefficient adds to the force is one product with the slope: the next order waits for no more.
+    // What the slip angle's newest coefficient adds to the force is one product with the slope: the next order waits for no more.
     #[inline(always)]
-    pub fn load(&mut self, n: usize, axle: &mut Axle<S, V>, with_slope: bool) {
+    fn load(&mut self, n: usize, axle: &mut Axle<S, V>, with_slope: bool) {
         let angle = &axle.slip_angle;
         if n == 0 {
             let softening = self.cubic * (angle[0] * angle[0]);
@@ -130,8 +142,17 @@ pub(super) fn offsets(tire: &Tire<f64>, injection: Injection<f64>) -> Vec<f64> {
 }
 
 impl<S: Simd, const V: usize> MagicTires<S, V> {
-    /// No tyre in any lane, with room for tyres whose mean takes `probes` slip angles.
-    pub fn new(simd: S, probes: usize) -> Self {
+    fn set_formula(&mut self, lane: usize, tire: &MagicFormula<f64>) {
+        self.stiffness.as_mut_slice()[lane] = tire.stiffness_per_rad;
+        self.linear.as_mut_slice()[lane] = tire.stiffness_per_rad * (1.0 - tire.curvature);
+        self.curvature.as_mut_slice()[lane] = tire.curvature;
+        self.shape.as_mut_slice()[lane] = tire.shape;
+        self.peak.as_mut_slice()[lane] = tire.peak_n / self.probes.len() as f64;
+    }
+}
+
+impl<S: Simd, const V: usize> Tires<S, V> for MagicTires<S, V> {
+    fn new(simd: S, like: &Tire<f64>, injection: Injection<f64>) -> Self {
         let zero = Lanes::splat(simd, 0.0);
         let probe = Probe {
             offset: zero,
@@ -147,36 +168,31 @@ impl<S: Simd, const V: usize> MagicTires<S, V> {
             curvature: zero,
             shape: zero,
             peak: zero,
-            probes: vec![probe; probes],
+            probes: vec![probe; offsets(like, injection).len()],
         }
     }
 
-    /// Puts a tyre into a lane.
-    pub fn set_lane(&mut self, lane: usize, tire: &MagicFormula<f64>, offsets: &[f64]) {
-        self.stiffness.as_mut_slice()[lane] = tire.stiffness_per_rad;
-        self.linear.as_mut_slice()[lane] = tire.stiffness_per_rad * (1.0 - tire.curvature);
-        self.curvature.as_mut_slice()[lane] = tire.curvature;
-        self.shape.as_mut_slice()[lane] = tire.shape;
-        self.peak.as_mut_slice()[lane] = tire.peak_n / self.probes.len() as f64;
-        for (probe, offset) in self.probes.iter_mut().zip(offsets) {
-            probe.offset.as_mut_slice()[lane] = *offset;
+    fn set_lane(&mut self, lane: usize, tire: &Tire<f64>, injection: Injection<f64>) {
+        if let Tire::MagicFormula(formula, _) = tire {
+            self.set_formula(lane, formula);
+            for (probe, offset) in self.probes.iter_mut().zip(offsets(tire, injection)) {
+                probe.offset.as_mut_slice()[lane] = offset;
+            }
         }
     }
 
-    /// Takes a lane's tyre off.
-    pub fn free_lane(&mut self, lane: usize) {
+    fn free_lane(&mut self, lane: usize) {
         let none = MagicFormula {
             stiffness_per_rad: 0.0,
             shape: 0.0,
             peak_n: 0.0,
             curvature: 0.0,
         };
-        self.set_lane(lane, &none, &vec![0.0; self.probes.len()]);
+        self.set_formula(lane, &none);
     }
 
-    /// Coefficient `n` of force and slope.
     #[inline(always)]
-    pub fn load(&mut self, n: usize, axle: &mut Axle<S, V>, with_slope: bool) {
+    fn load(&mut self, n: usize, axle: &mut Axle<S, V>, with_slope: bool) {
         let zero = self.peak.zero();
         let (mut sines, mut slopes) = (zero, zero);
         for probe in &mut self.probes {
@@ -204,6 +220,43 @@ impl<S: Simd, const V: usize> MagicTires<S, V> {
         axle.force[n] = self.peak * sines;
         if with_slope {
             axle.slope[n] = self.peak * self.shape * slopes;
+        }
+    }
+}
+
+/// Tyres of the kind that the motions have.
+pub(super) enum EitherTires<S: Simd, const V: usize> {
+    Cubic(CubicTires<S, V>),
+    Magic(MagicTires<S, V>),
+}
+
+impl<S: Simd, const V: usize> Tires<S, V> for EitherTires<S, V> {
+    fn new(simd: S, like: &Tire<f64>, injection: Injection<f64>) -> Self {
+        match like {
+            Tire::Cubic(_) => Self::Cubic(Tires::new(simd, like, injection)),
+            Tire::MagicFormula(..) => Self::Magic(Tires::new(simd, like, injection)),
+        }
+    }
+
+    fn set_lane(&mut self, lane: usize, tire: &Tire<f64>, injection: Injection<f64>) {
+        match self {
+            Self::Cubic(tires) => tires.set_lane(lane, tire, injection),
+            Self::Magic(tires) => tires.set_lane(lane, tire, injection),
+        }
+    }
+
+    fn free_lane(&mut self, lane: usize) {
+        match self {
+            Self::Cubic(tires) => tires.free_lane(lane),
+            Self::Magic(tires) => tires.free_lane(lane),
+        }
+    }
+
+    #[inline(always)]
+    fn load(&mut self, n: usize, axle: &mut Axle<S, V>, with_slope: bool) {
+        match self {
+            Self::Cubic(tires) => tires.load(n, axle, with_slope),
+            Self::Magic(tires) => tires.load(n, axle, with_slope),
         }
     }
 }
