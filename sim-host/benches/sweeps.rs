@@ -11,8 +11,11 @@ use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;
 use shared_model::tire::TireModel;
 use shared_model::vehicle::SlipForm;
+use sim_host::chaos::sweep::{Timing, Watch};
 use sim_host::engine::reference::Reference;
 use sim_host::engine::taylor::{Found, Motions, ORDER, Span, Watched};
+use sim_host::map::cell::{Cell, cells};
+use sim_host::map::plan::{Grid, Plan, Sheet, Start};
 use sim_host::motion::Motion;
 use std::hint::black_box;
 use std::path::Path;
@@ -28,7 +31,7 @@ struct Arguments {
     /// One JSON object per run of S, L and F, as `benches/peers/run --own` takes them; no M, no roofline
     #[arg(long)]
     json: bool,
-    /// Cells of the map's job M in each direction
+    /// Cells of job M's map in each direction
     #[arg(long, default_value_t = 256)]
     cells: usize,
     /// Given by cargo
@@ -47,7 +50,6 @@ const TOLERANCES: [f64; 11] = [
 ];
 /// Length of a motion of job M, s, half of it a transient.
 const MAP_TIME_S: f64 = 200.0;
-const MAP_TOLERANCE: f64 = 1e-10;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Job {
@@ -349,46 +351,41 @@ impl WithSimd for Peak {
     }
 }
 
-/// Job M: a map of exponent and turning points over wheel speed and amplitude, on one thread and on two.
-fn map(cells: usize) {
-    let mut scenarios = Vec::new();
-    for n in 0..cells {
-        for w in 0..cells {
-            let mut scenario = Scenario::reconstruction();
-            scenario.run.wheel_speed_rpm = 1000.0 + 1000.0 * n as f64 / cells as f64;
-            scenario.dither.waveform = Waveform::Square;
-            scenario.dither.amplitude_v = 0.2 * w as f64 / cells as f64;
-            scenarios.push(scenario);
-        }
-    }
-    let half = |pieces| Span {
-        time_s: 0.5 * MAP_TIME_S,
-        tolerance: MAP_TOLERANCE,
-        watched: Watched {
-            turns: [false, pieces > 0, false, false],
-            section: None,
-        },
-        warm_up_s: 0.05 * MAP_TIME_S,
-        pieces,
+/// Job M: the cells of a map over wheel speed and amplitude, tile by tile, on one thread and on two.
+fn map(cells_a_side: usize) {
+    let axis = |from, to| Grid {
+        from,
+        to,
+        count: cells_a_side,
     };
+    let sheet = Sheet {
+        waveform: Waveform::Square,
+        start: Start::Given,
+        amplitudes_v: axis(0.0, 0.2),
+    };
+    let timing = Timing {
+        transient_s: 0.5 * MAP_TIME_S,
+        observed_s: 0.5 * MAP_TIME_S,
+    };
+    let speeds_rpm = axis(1000.0, 2000.0);
+    let plan = Plan::new(Scenario::reconstruction(), vec![sheet], speeds_rpm, timing);
+    let plan = plan.expect("the map is valid");
+    let tiles: Vec<usize> = (0..plan.tiles()).collect();
     let run = |threads: usize| {
         pool(threads).install(|| {
             let start = Instant::now();
-            let mut motions = Motions::new(&scenarios).expect("the map fits");
-            let transient = motions.follow::<0>(&half(0));
-            motions.go_on_from(&transient);
-            let found = motions.follow::<1>(&half(128));
-            let seconds = start.elapsed().as_secs_f64();
-            let turns: usize = found.iter().map(|f| f.turns[1].len()).sum();
-            (seconds, turns)
+            let tile = |&tile: &usize| cells(&plan, &plan.places(tile)).expect("the cells fit");
+            let cells = Watch::NOBODY.points(&tiles, tile);
+            let cells: Vec<Cell> = cells.into_iter().flatten().flatten().collect();
+            (start.elapsed().as_secs_f64(), cells)
         })
     };
-    let (one_s, turns) = run(1);
-    let (two_s, turns_of_two) = run(2);
-    assert_eq!(turns, turns_of_two, "threads change nothing");
+    let (one_s, cells) = run(1);
+    let (two_s, cells_of_two) = run(2);
+    assert!(cells == cells_of_two, "threads change nothing");
     println!(
-        "M: {cells} x {cells} cells x {MAP_TIME_S} s: {one_s:.1} s on one thread, {two_s:.1} s on two: {:.2} times; {:.0} cells/s",
+        "M: {cells_a_side} x {cells_a_side} cells x {MAP_TIME_S} s: {one_s:.1} s on one thread, {two_s:.1} s on two: {:.2} times; {:.0} cells/s",
         one_s / two_s,
-        (cells * cells) as f64 / two_s
+        plan.cells() as f64 / two_s
     );
 }
