@@ -70,9 +70,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 fn show(comparisons: &[Comparison]) {
     let percent = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.4}"));
     let count = |period: Option<usize>| period.map_or("none".into(), |n| n.to_string());
-    println!("rad/s     period  averaged  cycle (%)  swing (%)");
+    say!("rad/s     period  averaged  cycle (%)  swing (%)");
     for comparison in comparisons {
-        println!(
+        say!(
             "{:<9.1} {:<7} {:<9} {:>9}  {:>9}",
             comparison.frequency_rad_per_s,
             count(comparison.period),

@@ -113,7 +113,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         .write(rows, &results, || chart(&results).svg())?;
     for (k, attractor) in basin.attractors.iter().enumerate() {
         let cells = basin.cells.iter().filter(|c| c.attractor == k).count();
-        println!("attractor {k}: {} ({cells} starts)", name(attractor));
+        say!("attractor {k}: {} ({cells} starts)", name(attractor));
     }
     check_interrupted(basin.cells.len(), runs)?;
     Ok(Done::Well)

@@ -17,6 +17,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
-    print!("{}", to_toml(&scenario));
+    say!("{}", to_toml(&scenario).trim_end());
     Ok(Done::Well)
 }

@@ -36,12 +36,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     );
     arguments.destinations.check_free()?;
     let errors = errors(&scenario, time_s)?;
-    println!("{:>10}  {:>10}  {:>6}", "step (s)", "error", "order");
+    say!("{:>10}  {:>10}  {:>6}", "step (s)", "error", "order");
     for error in &errors {
         let order = error
             .order
             .map_or(String::new(), |order| format!("{order:.2}"));
-        println!("{:>10}  {:>10.2e}  {order:>6}", error.step_s, error.error);
+        say!("{:>10}  {:>10.2e}  {order:>6}", error.step_s, error.error);
     }
     arguments
         .destinations

@@ -28,7 +28,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     }
     let recording = Recording::open(&arguments.telemetry)?;
     let trailer = &recording.trailer;
-    println!(
+    say!(
         "{} records of {} duty codes; exit code {}: {}; {} overruns; deepest stack {} bytes; PWM at {} of {} (neutral {})",
         recording.records.len(),
         recording.header.samples_per_step,

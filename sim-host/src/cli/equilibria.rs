@@ -160,10 +160,10 @@ fn show(results: &Results) {
     if let [speed] = &results.speeds[..] {
         show_speed(speed);
     } else {
-        println!("equilibria at {} speeds", results.speeds.len());
+        say!("equilibria at {} speeds", results.speeds.len());
     }
     for hopf in &results.hopf {
-        println!(
+        say!(
             "Hopf bifurcation from {:.3} to {:.3} rpm at delta_f = {:.4} rad, {:.4} rad/s: {} above",
             hopf.lower_rpm,
             hopf.upper_rpm,
@@ -177,12 +177,12 @@ fn show(results: &Results) {
         );
     }
     if results.speeds.len() > 1 && results.hopf.is_empty() {
-        println!("no Hopf bifurcation between these speeds");
+        say!("no Hopf bifurcation between these speeds");
     }
 }
 
 fn show_speed(speed: &Speed) {
-    println!(
+    say!(
         "{} equilibria at {} rpm",
         speed.equilibria.len(),
         speed.wheel_speed_rpm
@@ -196,12 +196,12 @@ fn show_speed(speed: &Speed) {
         } else {
             "unstable"
         };
-        println!(
+        say!(
             "  beta {beta:.6} rad, gamma {gamma:.6} rad/s, delta_f {delta:.6} rad: {stability}\n    eigenvalues {} 1/s",
             eigenvalues.join(", ")
         );
         if let Some(band) = &equilibrium.stick_band {
-            println!(
+            say!(
                 "    sticks for delta_f from {:.6} to {:.6} rad, {} while it does",
                 band.lower[STEERING_ANGLE].min(band.upper[STEERING_ANGLE]),
                 band.lower[STEERING_ANGLE].max(band.upper[STEERING_ANGLE]),

@@ -147,7 +147,7 @@ fn progress(runs: usize) -> ProgressBar {
 }
 
 fn report(rows: &[Row]) {
-    println!(
+    say!(
         "{:<10} {:>8} {:>8} {:>9} {:>8} {:>13} {:>15} {:>13}",
         "class",
         "injected",
@@ -161,7 +161,7 @@ fn report(rows: &[Row]) {
     let totals = totals(rows);
     for class in Class::ALL {
         let total = totals.get(&class).copied().unwrap_or_default();
-        println!(
+        say!(
             "{:<10} {:>8} {:>8} {:>9} {:>8} {:>13} {:>15} {:>7} ticks",
             class.name(),
             total.injected,
@@ -175,14 +175,16 @@ fn report(rows: &[Row]) {
     }
     let unlisted = rows.iter().filter(|row| row.is_unlisted());
     for row in unlisted.take(MOST_NAMED) {
-        println!(
+        say!(
             "silent: {} at {} s of {}",
-            row.fault, row.injected_s, row.manoeuvre
+            row.fault,
+            row.injected_s,
+            row.manoeuvre
         );
     }
     let reasons: BTreeSet<_> = rows.iter().filter_map(|row| row.accepted).collect();
     for reason in reasons {
         let of_it = rows.iter().filter(|row| row.accepted == Some(reason));
-        println!("silent and listed, {} times: {reason}", of_it.count());
+        say!("silent and listed, {} times: {reason}", of_it.count());
     }
 }

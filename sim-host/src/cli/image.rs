@@ -57,31 +57,36 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 }
 
 fn show(image: &Image, stack: &Stack) {
-    println!("built by {}", image.compiler);
-    println!(
+    say!("built by {}", image.compiler);
+    say!(
         "{} bytes of flash, {} bytes of RAM without stack",
-        image.flash_bytes, image.ram_bytes
+        image.flash_bytes,
+        image.ram_bytes
     );
-    println!(
+    say!(
         "worst stack {} of {} bytes: {} between the levels, and",
-        stack.worst_bytes, stack.room_bytes, stack.exception_frames_bytes
+        stack.worst_bytes,
+        stack.room_bytes,
+        stack.exception_frames_bytes
     );
     for Level { name, bytes, path } in &stack.levels {
-        println!("  {bytes:6}  {name}");
+        say!("  {bytes:6}  {name}");
         for (function, frame) in path {
-            println!("          {frame:6}  {function}");
+            say!("          {frame:6}  {function}");
         }
     }
-    println!(
+    say!(
         "frames: {} stated by the compiler, {} of them confirmed by their instructions; {} counted from the instructions alone",
-        stack.stated_functions, stack.confirmed_functions, stack.counted_functions
+        stack.stated_functions,
+        stack.confirmed_functions,
+        stack.counted_functions
     );
-    println!(
+    say!(
         "calls through pointers, to any of {} functions: {}",
         stack.address_taken,
         stack.indirect_callers.join(", ")
     );
     for problem in &stack.problems {
-        println!("no bound: {problem}");
+        say!("no bound: {problem}");
     }
 }

@@ -239,9 +239,13 @@ fn measure(
 }
 
 fn show(estimates: &[Estimate]) {
-    println!(
+    say!(
         "{:>8}  {:<22}{:>2}  {:>9}  {:>8}  finding",
-        "rpm", "method", "", "1/s", "error"
+        "rpm",
+        "method",
+        "",
+        "1/s",
+        "error"
     );
     for estimate in estimates {
         let number = |value: Option<f64>| value.map_or("-".into(), |value| format!("{value:.4}"));
@@ -249,7 +253,7 @@ fn show(estimates: &[Estimate]) {
             .reason
             .as_deref()
             .map(|reason| format!(": {reason}"));
-        println!(
+        say!(
             "{:>8}  {:<22}{:>2}  {:>9}  {:>8}  {}{}",
             estimate.wheel_speed_rpm,
             estimate.method.name(),

@@ -137,13 +137,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         );
     }
     if arguments.shard.is_some() {
-        println!("the shard is complete: {}", work.display());
+        say!("the shard is complete: {}", work.display());
         return Ok(Done::Well);
     }
     let cells = put_together(&[folder])?;
     arguments.files.write(&plan, &cells)?;
     show(&plan, &cells);
-    println!(
+    say!(
         "tiles: {}, to be deleted when no longer needed",
         work.display()
     );
@@ -271,7 +271,7 @@ fn show(plan: &Plan, cells: &[Cell]) {
             let count = cells.iter().filter(|cell| cell.kind == kind).count();
             100.0 * count as f64 / cells.len() as f64
         };
-        println!(
+        say!(
             "{:?} dither, {:?} start, {} cells: {:.1} % at rest, {:.1} % periodic, {:.1} % chaos, {:.1} % undecided, {:.1} % diverge",
             sheet.waveform,
             sheet.start,

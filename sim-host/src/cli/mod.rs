@@ -1,5 +1,13 @@
 //! One file a subcommand, and what they share: exit codes, configuration options, output files.
 
+/// Prints a line. A reader that has seen enough of it and closes the pipe (`| head`) is no fault, and ends nothing.
+macro_rules! say {
+    ($($line:tt)*) => {{
+        use std::io::Write as _;
+        writeln!(std::io::stdout(), $($line)*).ok();
+    }};
+}
+
 mod averaging;
 mod basin;
 mod config;

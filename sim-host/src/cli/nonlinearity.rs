@@ -69,9 +69,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         nonlinearities_chart(&scenario, &rows).svg()
     })?;
     let dither = &scenario.dither;
-    println!(
+    say!(
         "{:?} dither of {} V, {amplitude_rad:.6} rad ahead of the nonlinearities",
-        dither.waveform, dither.amplitude_v
+        dither.waveform,
+        dither.amplitude_v
     );
     Ok(Done::Well)
 }

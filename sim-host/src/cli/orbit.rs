@@ -147,7 +147,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments
         .destinations
         .write(rows, &results, || chart(&results).svg())?;
-    println!("{}", summary(&results));
+    say!("{}", summary(&results));
     check_interrupted(points.len(), values.count())?;
     Ok(Done::Well)
 }

@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         .svg()
     })?;
     for (component, (low, high)) in [(x, results.x_range), (y, results.y_range)] {
-        println!("{component}: from {low} to {high} {}", component.unit);
+        say!("{component}: from {low} to {high} {}", component.unit);
     }
     Ok(Done::Well)
 }

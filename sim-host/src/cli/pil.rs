@@ -255,9 +255,15 @@ impl Summary {
 }
 
 fn show(driven: &[Summary], link: LinkKind) {
-    println!(
+    say!(
         "{:38} {:>7} {:>9} {:>15} {:>15} {:>15} {:>7}",
-        "manoeuvre", "s", "duties", "model=software", "software=PIL", "f64 would be", "speed"
+        "manoeuvre",
+        "s",
+        "duties",
+        "model=software",
+        "software=PIL",
+        "f64 would be",
+        "speed"
     );
     for summary in driven {
         let other = summary.double_precision_different_duties;
@@ -265,7 +271,7 @@ fn show(driven: &[Summary], link: LinkKind) {
             0 => "the same".into(),
             _ => format!("{other}, <= {}", summary.double_precision_worst_counts),
         };
-        println!(
+        say!(
             "{:38} {:7.2} {:9} {:>15} {:>15} {:>15} {:>5.1} x",
             summary.manoeuvre,
             summary.simulated_s,
@@ -277,16 +283,16 @@ fn show(driven: &[Summary], link: LinkKind) {
         );
     }
     if let [only] = driven {
-        println!("firmware: {}", only.firmware);
+        say!("firmware: {}", only.firmware);
     }
-    println!(
+    say!(
         "duties and actuator frames, bit for bit; `f64 would be`: duty codes of an ECU in f64 that differ, and by how many counts"
     );
-    println!(
+    say!(
         "not compared: costs and times (the emulator counts instructions), the log, and the vehicle, which is the same code at \
          every level; the model level has no frame checks, so no warnings"
     );
-    println!(
+    say!(
         "PIL: {}",
         match link {
             LinkKind::Files =>
@@ -314,7 +320,7 @@ fn replay(file: &Path) -> anyhow::Result<Done> {
     let recording = Recording::read(&bytes).with_context(|| name.to_string())?;
     let replayed = recording.replay().with_context(|| name.to_string())?;
     let comparison = compare(&recording.exchanges, &replayed, Depth::Bytes);
-    println!(
+    say!(
         "{} duties and {} actuator frames replayed: {}",
         comparison.duties,
         comparison.frames,

@@ -166,9 +166,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             }
             .svg()
         })?;
-    println!("{} crossings of {section}", found.len());
+    say!("{} crossings of {section}", found.len());
     if let Some(time_s) = results.mean_return_time_s {
-        println!("mean time between them {time_s:.6} s");
+        say!("mean time between them {time_s:.6} s");
     }
     Ok(Done::Well)
 }

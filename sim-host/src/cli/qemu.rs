@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     {
         bail!("setting {setting:?}: the firmware takes no blanks in a setting");
     }
-    let show = |line: &str| println!("{line}");
+    let show = |line: &str| say!("{line}");
     let finished = qemu::run(
         &image,
         arguments.machine,

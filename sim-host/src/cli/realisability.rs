@@ -73,7 +73,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         .destinations
         .write(&rows, &results, || bode_chart(&scenario, &rows).svg())?;
     for demand in &results.demands {
-        println!("{}", sentence(demand));
+        say!("{}", sentence(demand));
     }
     Ok(Done::Well)
 }

@@ -149,13 +149,13 @@ fn row<'a>(
 fn show(results: &Results) {
     let unit = results.parameter.unit();
     for sweep in &results.sweeps {
-        println!("from the {} start:", sweep.start);
+        say!("from the {} start:", sweep.start);
         for region in &sweep.found.regions {
             let inside = |s: &&Sample| (region.from..=region.to).contains(&s.value);
             let mut lobes: Vec<_> = sweep.found.samples.iter().filter(inside).collect();
             lobes.dedup_by_key(|sample| sample.attractor.lobe());
             let lobes: Vec<_> = lobes.iter().map(|s| s.attractor.lobe()).collect();
-            println!(
+            say!(
                 "  {:10.4} to {:10.4} {unit}  {}, steering angle {}",
                 region.from,
                 region.to,
@@ -164,19 +164,22 @@ fn show(results: &Results) {
             );
         }
         for edge in &sweep.found.edges {
-            println!(
+            say!(
                 "  edge from {:.4} to {:.4} {unit}: {} below, {} above",
-                edge.lower, edge.upper, edge.below, edge.above
+                edge.lower,
+                edge.upper,
+                edge.below,
+                edge.above
             );
         }
     }
     let at = &results.coexisting_at;
     match (at.first(), at.last()) {
-        (Some(first), Some(last)) => println!(
+        (Some(first), Some(last)) => say!(
             "two attractors coexist at {} values from {first} to {last} {unit}",
             at.len()
         ),
-        _ => println!("both starts end on the same attractor at every value"),
+        _ => say!("both starts end on the same attractor at every value"),
     }
 }
 

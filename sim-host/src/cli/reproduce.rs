@@ -81,7 +81,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         "stopped; what is done is in {}, and the same command goes on from there",
         page.display()
     );
-    println!(
+    say!(
         "page: {} ({:.0} s)",
         page.display(),
         start.elapsed().as_secs_f64()
@@ -128,9 +128,9 @@ fn show(summary: &Summary) {
         verdict,
     } in &summary.judgements
     {
-        println!("{claim} {preset:<15} {:<19} {measured}", verdict.words());
+        say!("{claim} {preset:<15} {:<19} {measured}", verdict.words());
         if !distance.is_empty() {
-            println!("{:38} {distance}", "");
+            say!("{:38} {distance}", "");
         }
     }
 }

@@ -291,12 +291,12 @@ fn show(analysis: &Analysis) {
         Waveform::Sine => "sine",
         Waveform::Square | Waveform::None => "square wave",
     };
-    println!(
+    say!(
         "{word} (a range ends within {:.1} mV beyond the ends given):",
         1e3 * analysis.edge_width_v
     );
     for entry in &analysis.entries {
-        println!("  {:.4} V  {}", entry.amplitude_v, table::remark(entry));
+        say!("  {:.4} V  {}", entry.amplitude_v, table::remark(entry));
     }
     let count = |choice| {
         analysis
@@ -305,7 +305,7 @@ fn show(analysis: &Analysis) {
             .filter(|e| e.choice == choice)
             .count()
     };
-    println!(
+    say!(
         "  speeds: {} need none, {} get period one, {} only rest, {} neither",
         count(Choice::Undithered),
         count(Choice::PeriodOne),
@@ -314,21 +314,24 @@ fn show(analysis: &Analysis) {
     );
     let failed: Vec<&Cell> = analysis.failed_checks().collect();
     let coexist = analysis.checks.iter().filter(|cell| cell.coexist());
-    println!(
+    say!(
         "  checks with the true signal at the speeds and midway: {} of {} are calm; at {} of them a motion and an equilibrium coexist",
         analysis.checks.len() - failed.len(),
         analysis.checks.len(),
         coexist.count()
     );
     if analysis.entries[0].amplitude_v > 0.0 {
-        println!(
+        say!(
             "  WARNING: the first speed needs dither already, and the table has none below it; begin lower"
         );
     }
     for cell in failed {
-        println!(
+        say!(
             "  FAILED at {} rpm, {:.4} V: {} from the given start, {} from the mirrored one",
-            cell.wheel_speed_rpm, cell.amplitude_v, cell.given, cell.mirrored
+            cell.wheel_speed_rpm,
+            cell.amplitude_v,
+            cell.given,
+            cell.mirrored
         );
     }
 }

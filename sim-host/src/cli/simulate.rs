@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         );
     }
     write(&trace, &arguments.out, arguments.force)?;
-    println!(
+    say!(
         "{} states over {} s in {}",
         trace.states.len(),
         trace.time_s(trace.states.len() - 1),

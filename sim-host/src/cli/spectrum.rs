@@ -106,12 +106,16 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments
         .destinations
         .write(&results.bins, &results, || chart(&scenario, &results).svg())?;
-    println!(
+    say!(
         "{} segments, bins of {:.4} Hz; power {:.6e} ({})\u{b2}, greatest at {:.4} Hz",
-        results.segments, results.bin_hz, results.power, component.unit, results.peak_hz
+        results.segments,
+        results.bin_hz,
+        results.power,
+        component.unit,
+        results.peak_hz
     );
     if let Some(line) = &results.dither {
-        println!(
+        say!(
             "dither line at {:.3} Hz ({} rad/s): amplitude {:.4e} {}, {:.1} times the density around it",
             line.frequency_hz,
             line.frequency_rad_per_s,

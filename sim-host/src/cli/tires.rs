@@ -53,7 +53,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             .iter()
             .max_by(|a, b| a.magic_formula_n.total_cmp(&b.magic_formula_n));
         if let Some(row) = greatest {
-            println!(
+            say!(
                 "{} road, {}: Magic Formula at most {:.1} N, at {:.4} rad",
                 row.road.replace('_', "-"),
                 row.axle,

@@ -153,12 +153,10 @@ fn write_report(
 
 fn show(verification: &Verification, folder: &Path, elapsed: Duration) {
     let verdict = &verification.verdict;
-    print!(
-        "{}",
-        terminal::table(verdict, std::io::stdout().is_terminal())
-    );
-    println!("report: {}", folder.join("index.html").display());
-    println!(
+    let table = terminal::table(verdict, std::io::stdout().is_terminal());
+    say!("{}", table.trim_end());
+    say!("report: {}", folder.join("index.html").display());
+    say!(
         "verdict: {} in {:.0} s",
         verdict.verdict,
         elapsed.as_secs_f64()
