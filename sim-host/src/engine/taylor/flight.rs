@@ -1,41 +1,32 @@
 //! The steps: many motions in lanes, each with its own time.
 
+mod boarding;
+mod growth;
+mod watch;
+
 use super::equation::Equation;
 use super::expansion::Expansion;
 use super::guard::{Guards, RELEASE_MARGIN};
 use super::lanes::Lanes;
-use super::motion::{Crossing, Found, Span};
-use super::queue::{LONGEST_STEP_S, Motion, Numbers, Queue, Waiting};
-use super::roots::{self, derivative};
-use super::series::{ORDER, Series, of_lane, value};
+use super::motion::{Found, Span};
+use super::queue::{LONGEST_STEP_S, Motion, Numbers, Queue};
+use super::series::{ORDER, Series, value};
 use crate::engine::events::{Guard, next_mode};
-use crate::motion::Diverged;
-use crate::trace::BOUND;
 use nalgebra::Vector4;
 use pulp::Simd;
 use shared_model::friction::FrictionMode;
-use shared_model::vehicle::{STEERING_RATE, State, YAW_RATE};
+use shared_model::vehicle::STEERING_RATE;
 
-/// A motion that needs a step shorter than this leaves all bounds, s.
-const SHORTEST_STEP_S: f64 = 1e-9;
 /// Factor by which a step shrinks until it meets the tolerance, and its inverse by which it grows where that would have met it.
 const SHRINK: f64 = 0.92;
 /// Factors tried without asking whether they are needed: the processor would rather try than guess.
 const USUAL_SHRINKS: usize = 3;
 /// Factors tried before a step is given up.
 const MOST_SHRINKS: usize = 300;
-/// A rate of change below this (in the component's unit a second) is rounding, which has turning points of its own.
-const RATE_FLOOR: f64 = 1e-13;
-/// A mode shorter than this, s, is one of a row in which a motion slides along a step of its friction law, and so many of them are
-/// one too many.
+/// A mode shorter than this, s, is one of a row in which a motion slides along a step of its friction law.
 const SHORT_MODE_S: f64 = 1e-6;
-const MOST_SHORT_MODES: usize = 1000;
 /// After so many steps another of the last motions waits for its turn.
 const STEPS_A_TURN: usize = 64;
-/// Lengths of a tangent vector, squared, that leave room for a step's growth.
-const LENGTHS_SQUARED: (f64, f64) = (1e-200, 1e200);
-/// A tangent vector is lost when orthogonalisation leaves less than this share of it, squared.
-const LOST_SQUARED: f64 = 1e-24;
 
 /// What was found of the task with an index.
 pub(super) type Result<const K: usize> = (usize, Found<K>);
@@ -111,19 +102,6 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             }
         }
         self.results
-    }
-
-    /// The last motions share the lanes by turns, so that none of them is left to go on alone at the end.
-    #[inline(never)]
-    fn take_turns(&mut self) {
-        if !(1..=self.lanes.len()).contains(&self.queue.len()) {
-            return;
-        }
-        self.turn = (self.turn + 1) % self.lanes.len();
-        if let Some(motion) = self.take(self.turn) {
-            self.queue.push(motion);
-            self.load_next(self.turn);
-        }
     }
 
     #[inline(always)]
@@ -207,102 +185,6 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         }
     }
 
-    /// Notes the turning points of a component within the step.
-    #[inline(always)]
-    fn watch_turns(&mut self, component: usize, step_s: &Lanes<S, V>) {
-        let x = &self.expansion.x[component];
-        let mut rate = [Lanes::splat(self.simd, 0.0); ORDER + 1];
-        for k in 0..ORDER {
-            rate[k] = x[k + 1].scale((k + 1) as f64);
-        }
-        let clear =
-            clearance(&rate, value(&rate, *step_s), *step_s) + Lanes::splat(self.simd, RATE_FLOOR);
-        let bend = bend(&rate, *step_s);
-        if bend.all_less(clear) {
-            return;
-        }
-        for lane in 0..Lanes::<S, V>::COUNT {
-            if bend.as_slice()[lane] < clear.as_slice()[lane] {
-                continue;
-            }
-            let most_s = step_s.as_slice()[lane];
-            let begin_s = self.time_s(lane);
-            let path = of_lane(&self.expansion.x[component], lane);
-            let tangent = match component {
-                YAW_RATE => self.expansion.tangents.first(),
-                _ => None,
-            };
-            let stretch = match self.stretch.first() {
-                Some(stretch) => stretch.as_slice()[lane],
-                None => 1.0,
-            };
-            let Some(motion) = &mut self.lanes[lane] else {
-                continue;
-            };
-            roots::roots(&derivative(&path), most_s, |root_s, _| {
-                let turn = roots::value(&path, root_s);
-                motion.found.turns[component].push((begin_s + root_s, turn));
-                motion.found.extend(component, turn);
-                if let Some(tangent) = tangent {
-                    let growth =
-                        motion.growth_before + stretch.ln() + log_length(tangent, lane, root_s);
-                    motion.found.growth_at_turns.push(growth);
-                }
-            });
-        }
-    }
-
-    /// Notes the crossings of a component's level within the step.
-    #[inline(always)]
-    fn watch_section(
-        &mut self,
-        component: usize,
-        level: f64,
-        step_s: &Lanes<S, V>,
-        next: &[Lanes<S, V>; 4],
-    ) {
-        let level_lanes = Lanes::splat(self.simd, level);
-        let mut series = self.expansion.x[component];
-        series[0] = series[0] - level_lanes;
-        let clear = clearance(&series, next[component] - level_lanes, *step_s);
-        let bend = bend(&series, *step_s);
-        if bend.all_less(clear) {
-            return;
-        }
-        for lane in 0..Lanes::<S, V>::COUNT {
-            if bend.as_slice()[lane] < clear.as_slice()[lane] {
-                continue;
-            }
-            let most_s = step_s.as_slice()[lane];
-            let begin_s = self.time_s(lane);
-            let height = of_lane(&series, lane);
-            let x = &self.expansion.x;
-            let Some(motion) = &mut self.lanes[lane] else {
-                continue;
-            };
-            roots::roots(&height, most_s, |root_s, rising| {
-                motion.found.crossings.push(Crossing {
-                    time_s: begin_s + root_s,
-                    x: x.each_ref()
-                        .map(|series| roots::value(&of_lane(series, lane), root_s)),
-                    rising,
-                });
-            });
-        }
-    }
-
-    /// A lane's time from the start, s.
-    fn time_s(&self, lane: usize) -> f64 {
-        match &self.lanes[lane] {
-            Some(motion) => self.ends_s[motion.piece] - self.left_s.as_slice()[lane],
-            None => 0.0,
-        }
-    }
-
-    fn state(&self, lane: usize) -> [f64; 4] {
-        self.expansion.x.each_ref().map(|x| x[0].as_slice()[lane])
-    }
-
     /// The mode of a lane ends, which `lasted_s` since the step began; the guard is at `bound`. Tangent vectors jump by the
     /// saltation matrix (M. di Bernardo et al., Piecewise-smooth Dynamical Systems, section 2.5): only the steering's
     /// acceleration jumps.
@@ -371,248 +253,17 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         self.guards.set_lane(lane, model, injection, motion.mode);
     }
 
-    /// Keeps a single tangent vector within the range of numbers; several at right angles and of length one, by Gram and Schmidt.
-    #[inline(always)]
-    fn keep_tangents_finite(&mut self) {
-        if K == 0 {
-            return;
-        }
-        if K == 1 {
-            let vector = coefficients(&self.expansion.tangents[0], 0);
-            let square = dot(&vector, &vector);
-            let (least, most) = LENGTHS_SQUARED;
-            let simd = self.simd;
-            let splat = |number| Lanes::splat(simd, number);
-            if !(splat(least).all_less(square) && square.all_less(splat(most))) {
-                for lane in 0..Lanes::<S, V>::COUNT {
-                    if !(least..most).contains(&square.as_slice()[lane]) {
-                        self.count_growth(lane);
-                    }
-                }
-            }
-            return;
-        }
-        self.orthonormalise();
-        let (least, most) = LENGTHS_SQUARED;
-        let simd = self.simd;
-        let splat = |number| Lanes::splat(simd, number);
-        for k in 0..K {
-            let stretch = self.stretch[k];
-            if !(splat(least).all_less(stretch) && stretch.all_less(splat(most))) {
-                for lane in 0..Lanes::<S, V>::COUNT {
-                    if !(least..most).contains(&stretch.as_slice()[lane]) {
-                        self.count_growth(lane);
-                    }
-                }
-            }
-        }
+    fn state(&self, lane: usize) -> [f64; 4] {
+        self.expansion.x.each_ref().map(|x| x[0].as_slice()[lane])
     }
 
-    #[inline(always)]
-    fn orthonormalise(&mut self) {
-        let simd = self.simd;
-        let splat = |number| Lanes::splat(simd, number);
-        let tangents = &mut self.expansion.tangents;
-        let mut units = [[splat(0.0); 4]; K];
-        for k in 0..K {
-            let mut vector = coefficients(&tangents[k], 0);
-            let before = dot(&vector, &vector);
-            for j in 0..k {
-                let share = -dot(&vector, &units[j]);
-                for i in 0..4 {
-                    vector[i] = units[j][i].mul_add(share, vector[i]);
-                }
-            }
-            let after = dot(&vector, &vector);
-            let lost = before.scale(LOST_SQUARED);
-            let length = lost.select_less(after, after.sqrt(), splat(0.0));
-            let inverse = lost.select_less(after, splat(1.0).over(length), splat(0.0));
-            self.stretch[k] = self.stretch[k] * length;
-            for i in 0..4 {
-                units[k][i] = vector[i] * inverse;
-                tangents[k][i][0] = units[k][i];
-            }
+    /// A lane's time from the start, s.
+    fn time_s(&self, lane: usize) -> f64 {
+        match &self.lanes[lane] {
+            Some(motion) => self.ends_s[motion.piece] - self.left_s.as_slice()[lane],
+            None => 0.0,
         }
     }
-
-    /// Adds what a lane's tangent vectors have grown by to its growth, and goes on with unit vectors.
-    #[inline(never)]
-    fn count_growth(&mut self, lane: usize) {
-        let Some(motion) = &mut self.lanes[lane] else {
-            return;
-        };
-        if K == 1 {
-            let x = &mut self.expansion.tangents[0];
-            let square: f64 = x.iter().map(|x| x[0].as_slice()[lane].powi(2)).sum();
-            let length = square.sqrt();
-            motion.growth[0] += length.ln();
-            motion.growth_before += length.ln();
-            for x in x {
-                x[0].as_mut_slice()[lane] /= length;
-            }
-            return;
-        }
-        motion.growth_before += self.stretch[0].as_slice()[lane].ln();
-        for (growth, stretch) in motion.growth.iter_mut().zip(&mut self.stretch) {
-            let stretch = &mut stretch.as_mut_slice()[lane];
-            *growth += stretch.ln();
-            *stretch = 1.0;
-        }
-    }
-
-    /// Ends pieces and motions that are at their ends, and motions that leave all bounds.
-    #[inline(always)]
-    fn end_what_has_ended(&mut self) {
-        let simd = self.simd;
-        let splat = |number| Lanes::splat(simd, number);
-        let room = splat(BOUND) - greatest(&self.expansion.x, 0);
-        if splat(0.0).all_less(self.left_s.min(room)) {
-            return;
-        }
-        for lane in 0..Lanes::<S, V>::COUNT {
-            self.end_of_lane(lane);
-        }
-    }
-
-    #[inline(never)]
-    fn end_of_lane(&mut self, lane: usize) {
-        let x = self.state(lane);
-        let step_s = self.step_s.as_slice()[lane];
-        let left_s = self.left_s.as_slice()[lane];
-        let time_s = self.time_s(lane);
-        let Some(motion) = &mut self.lanes[lane] else {
-            return;
-        };
-        let bounded = x.iter().all(|value| value.abs() < BOUND);
-        let slides = motion.short_modes > MOST_SHORT_MODES;
-        if !bounded || step_s < SHORTEST_STEP_S || slides {
-            motion.found.diverged = Some(Diverged { time_s });
-            self.unload(lane);
-        } else if left_s <= 0.0 {
-            self.end_piece(lane);
-        }
-    }
-
-    fn end_piece(&mut self, lane: usize) {
-        if K > 0 {
-            self.count_growth(lane);
-        }
-        let Some(motion) = &mut self.lanes[lane] else {
-            return;
-        };
-        // The first piece is for the tangent vectors to turn into their directions.
-        if motion.piece > 0 {
-            motion.found.growths.push(motion.growth);
-        }
-        motion.growth = [0.0; K];
-        if motion.piece + 1 == self.ends_s.len() {
-            self.unload(lane);
-            return;
-        }
-        motion.piece += 1;
-        let length_s = self.ends_s[motion.piece] - self.ends_s[motion.piece - 1];
-        self.left_s.as_mut_slice()[lane] = length_s;
-    }
-
-    /// Puts a motion's findings aside, and the next motion into its lane.
-    fn unload(&mut self, lane: usize) {
-        if let Some((mut motion, numbers)) = self.take(lane) {
-            motion.found.end = State {
-                x: numbers.x.into(),
-                friction: motion.mode,
-            };
-            for (i, x) in numbers.x.into_iter().enumerate() {
-                motion.found.extend(i, x);
-            }
-            self.results.push((motion.index, motion.found));
-        }
-        self.load_next(lane);
-    }
-
-    fn load_next(&mut self, lane: usize) {
-        match self.queue.next() {
-            Some(motion) => self.load(lane, motion),
-            None => self.set_numbers(lane, &Numbers::of_nobody()),
-        }
-    }
-
-    fn load(&mut self, lane: usize, (mut motion, numbers): Waiting<'a, K>) {
-        self.set_numbers(lane, &numbers);
-        let (model, injection) = (&motion.task.model, motion.task.injection);
-        self.expansion.set_lane(lane, model, injection);
-        motion.boarded = self.steps;
-        self.lanes[lane] = Some(motion);
-        self.aboard += 1;
-        self.load_mode(lane);
-    }
-
-    /// Takes a motion out of its lane, which rests.
-    fn take(&mut self, lane: usize) -> Option<Waiting<'a, K>> {
-        let mut motion = self.lanes[lane].take()?;
-        motion.found.steps += self.steps - motion.boarded;
-        let numbers = Numbers {
-            x: self.state(lane),
-            tangents: self.expansion.tangents.each_ref().map(|tangent| {
-                let coefficient = |x: &Series<S, V>| x[0].as_slice()[lane];
-                tangent.each_ref().map(coefficient)
-            }),
-            stretch: self.stretch.map(|stretch| stretch.as_slice()[lane]),
-            step_s: self.step_s.as_slice()[lane],
-            left_s: self.left_s.as_slice()[lane],
-        };
-        self.aboard -= 1;
-        self.expansion.free_lane(lane);
-        self.guards.free_lane(lane);
-        Some((motion, numbers))
-    }
-
-    fn set_numbers(&mut self, lane: usize, numbers: &Numbers<K>) {
-        for i in 0..4 {
-            self.expansion.x[i][0].as_mut_slice()[lane] = numbers.x[i];
-            for k in 0..K {
-                let component = &mut self.expansion.tangents[k][i][0];
-                component.as_mut_slice()[lane] = numbers.tangents[k][i];
-            }
-        }
-        for k in 0..K {
-            self.stretch[k].as_mut_slice()[lane] = numbers.stretch[k];
-        }
-        self.step_s.as_mut_slice()[lane] = numbers.step_s;
-        self.left_s.as_mut_slice()[lane] = numbers.left_s;
-    }
-}
-
-/// Logarithm of the length of one lane's tangent vector, `t` from the step's beginning.
-#[inline(always)]
-fn log_length<S: Simd, const V: usize>(tangent: &[Series<S, V>; 4], lane: usize, t: f64) -> f64 {
-    let mut square = 0.0;
-    for series in tangent {
-        square += roots::value(&of_lane(series, lane), t).powi(2);
-    }
-    0.5 * square.ln()
-}
-
-/// Bound on how far a polynomial is from its chord within (0, `t`).
-#[inline(always)]
-fn bend<S: Simd, const V: usize>(series: &Series<S, V>, t: Lanes<S, V>) -> Lanes<S, V> {
-    let mut sum = series[ORDER].abs();
-    for k in (2..ORDER).rev() {
-        sum = sum.mul_add(t, series[k].abs());
-    }
-    sum * (t * t)
-}
-
-/// Distance from zero of a polynomial's chord over a step; negative where it changes sign.
-#[inline(always)]
-fn clearance<S: Simd, const V: usize>(
-    series: &Series<S, V>,
-    end: Lanes<S, V>,
-    step_s: Lanes<S, V>,
-) -> Lanes<S, V> {
-    let zero = step_s.zero();
-    let begin = series[0];
-    let end = begin.select_less(zero, -end, end);
-    begin.abs().min(end)
 }
 
 /// Coefficient `n` of each component.
@@ -626,11 +277,6 @@ fn coefficients<S: Simd, const V: usize>(x: &[Series<S, V>; 4], n: usize) -> [La
 fn greatest<S: Simd, const V: usize>(x: &[Series<S, V>; 4], n: usize) -> Lanes<S, V> {
     let [a, b, c, d] = coefficients(x, n);
     a.abs().max(b.abs()).max(c.abs().max(d.abs()))
-}
-
-#[inline(always)]
-fn dot<S: Simd, const V: usize>(a: &[Lanes<S, V>; 4], b: &[Lanes<S, V>; 4]) -> Lanes<S, V> {
-    a[0].mul_add(b[0], a[1] * b[1]) + a[2].mul_add(b[2], a[3] * b[3])
 }
 
 /// The power of the last term.

@@ -1,0 +1,152 @@
+//! Motions get on, take turns, come to their ends and get off.
+
+use super::{Flight, greatest};
+use crate::engine::taylor::equation::Equation;
+use crate::engine::taylor::lanes::Lanes;
+use crate::engine::taylor::queue::{Numbers, Waiting};
+use crate::engine::taylor::series::Series;
+use crate::motion::Diverged;
+use crate::trace::BOUND;
+use pulp::Simd;
+use shared_model::vehicle::State;
+
+/// A motion that needs a step shorter than this leaves all bounds, s.
+const SHORTEST_STEP_S: f64 = 1e-9;
+/// So many short modes in a row are one too many.
+const MOST_SHORT_MODES: usize = 1000;
+
+impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, K, E> {
+    /// The last motions share the lanes by turns, so that none of them is left to go on alone at the end.
+    #[inline(never)]
+    pub(super) fn take_turns(&mut self) {
+        if !(1..=self.lanes.len()).contains(&self.queue.len()) {
+            return;
+        }
+        self.turn = (self.turn + 1) % self.lanes.len();
+        if let Some(motion) = self.take(self.turn) {
+            self.queue.push(motion);
+            self.load_next(self.turn);
+        }
+    }
+
+    /// Ends pieces and motions that are at their ends, and motions that leave all bounds.
+    #[inline(always)]
+    pub(super) fn end_what_has_ended(&mut self) {
+        let simd = self.simd;
+        let splat = |number| Lanes::splat(simd, number);
+        let room = splat(BOUND) - greatest(&self.expansion.x, 0);
+        if splat(0.0).all_less(self.left_s.min(room)) {
+            return;
+        }
+        for lane in 0..Lanes::<S, V>::COUNT {
+            self.end_of_lane(lane);
+        }
+    }
+
+    #[inline(never)]
+    fn end_of_lane(&mut self, lane: usize) {
+        let x = self.state(lane);
+        let step_s = self.step_s.as_slice()[lane];
+        let left_s = self.left_s.as_slice()[lane];
+        let time_s = self.time_s(lane);
+        let Some(motion) = &mut self.lanes[lane] else {
+            return;
+        };
+        let bounded = x.iter().all(|value| value.abs() < BOUND);
+        let slides = motion.short_modes > MOST_SHORT_MODES;
+        if !bounded || step_s < SHORTEST_STEP_S || slides {
+            motion.found.diverged = Some(Diverged { time_s });
+            self.unload(lane);
+        } else if left_s <= 0.0 {
+            self.end_piece(lane);
+        }
+    }
+
+    fn end_piece(&mut self, lane: usize) {
+        if K > 0 {
+            self.count_growth(lane);
+        }
+        let Some(motion) = &mut self.lanes[lane] else {
+            return;
+        };
+        // The first piece is for the tangent vectors to turn into their directions.
+        if motion.piece > 0 {
+            motion.found.growths.push(motion.growth);
+        }
+        motion.growth = [0.0; K];
+        if motion.piece + 1 == self.ends_s.len() {
+            self.unload(lane);
+            return;
+        }
+        motion.piece += 1;
+        let length_s = self.ends_s[motion.piece] - self.ends_s[motion.piece - 1];
+        self.left_s.as_mut_slice()[lane] = length_s;
+    }
+
+    /// Puts a motion's findings aside, and the next motion into its lane.
+    fn unload(&mut self, lane: usize) {
+        if let Some((mut motion, numbers)) = self.take(lane) {
+            motion.found.end = State {
+                x: numbers.x.into(),
+                friction: motion.mode,
+            };
+            for (i, x) in numbers.x.into_iter().enumerate() {
+                motion.found.extend(i, x);
+            }
+            self.results.push((motion.index, motion.found));
+        }
+        self.load_next(lane);
+    }
+
+    pub(super) fn load_next(&mut self, lane: usize) {
+        match self.queue.next() {
+            Some(motion) => self.load(lane, motion),
+            None => self.set_numbers(lane, &Numbers::of_nobody()),
+        }
+    }
+
+    fn load(&mut self, lane: usize, (mut motion, numbers): Waiting<'a, K>) {
+        self.set_numbers(lane, &numbers);
+        let (model, injection) = (&motion.task.model, motion.task.injection);
+        self.expansion.set_lane(lane, model, injection);
+        motion.boarded = self.steps;
+        self.lanes[lane] = Some(motion);
+        self.aboard += 1;
+        self.load_mode(lane);
+    }
+
+    /// Takes a motion out of its lane, which rests.
+    fn take(&mut self, lane: usize) -> Option<Waiting<'a, K>> {
+        let mut motion = self.lanes[lane].take()?;
+        motion.found.steps += self.steps - motion.boarded;
+        let numbers = Numbers {
+            x: self.state(lane),
+            tangents: self.expansion.tangents.each_ref().map(|tangent| {
+                let coefficient = |x: &Series<S, V>| x[0].as_slice()[lane];
+                tangent.each_ref().map(coefficient)
+            }),
+            stretch: self.stretch.map(|stretch| stretch.as_slice()[lane]),
+            step_s: self.step_s.as_slice()[lane],
+            left_s: self.left_s.as_slice()[lane],
+        };
+        self.aboard -= 1;
+        self.expansion.free_lane(lane);
+        self.guards.free_lane(lane);
+        Some((motion, numbers))
+    }
+
+    pub(super) fn set_numbers(&mut self, lane: usize, numbers: &Numbers<K>) {
+        for i in 0..4 {
+            self.expansion.x[i][0].as_mut_slice()[lane] = numbers.x[i];
+            for k in 0..K {
+                let component = &mut self.expansion.tangents[k][i][0];
+                component.as_mut_slice()[lane] = numbers.tangents[k][i];
+            }
+        }
+        for k in 0..K {
+            self.stretch[k].as_mut_slice()[lane] = numbers.stretch[k];
+        }
+        self.step_s.as_mut_slice()[lane] = numbers.step_s;
+        self.left_s.as_mut_slice()[lane] = numbers.left_s;
+    }
+}
