@@ -212,3 +212,75 @@ fn first_fall(mut room: Polynomial, most_s: f64) -> Option<f64> {
     });
     first
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use pulp::Scalar;
+
+    const STEP_S: f64 = 0.02;
+    const SAMPLES: usize = 2000;
+
+    /// Coefficients of a polynomial whose terms at the step's end are given.
+    fn series(terms: &[f64]) -> Series<Scalar, 1> {
+        let simd = Scalar::new();
+        let coefficient = |k: usize| terms.get(k).copied().unwrap_or(0.0) / STEP_S.powi(k as i32);
+        std::array::from_fn(|k| Lanes::splat(simd, coefficient(k)))
+    }
+
+    /// The first sample beyond the bounds, s.
+    fn first_beyond(path: &Polynomial, lower: f64, upper: f64) -> Option<f64> {
+        let at = |k: usize| STEP_S * k as f64 / SAMPLES as f64;
+        let is_beyond = |t: &f64| !(lower..=upper).contains(&roots::value(path, *t));
+        (1..=SAMPLES).map(at).find(is_beyond)
+    }
+
+    /// A path that is above the lower bound at the step's beginning, by `above`, and touches `lower - depth` at a share of it.
+    fn dip(above: f64, share: f64, depth: f64) -> Vec<f64> {
+        let bend = (above + depth) / (share * share);
+        vec![above, -2.0 * bend * share, bend]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(3000))]
+
+        /// Where there is room the bounds are kept; where they are not, the first instant beyond them is found, also of a path that
+        /// comes back within the step.
+        #[test]
+        fn no_end_of_a_mode_is_missed(
+            above in 0.0..1.0,
+            share in 0.05..1.5,
+            depth in -0.3..0.3,
+            higher in proptest::collection::vec(-0.1..0.1, 3),
+            upper in 0.5..3.0,
+            per_force in prop_oneof![Just(0.0), Just(-0.02)],
+            force in proptest::collection::vec(-1.0..1.0, 4),
+        ) {
+            let simd = Scalar::new();
+            let mut terms = dip(above, share, depth);
+            terms.extend(higher);
+            let (argument, force) = (series(&terms), series(&force));
+            let mut guards = Guards::<Lanes<Scalar, 1>>::none(simd);
+            guards.lower = Lanes::splat(simd, 0.0);
+            guards.upper = Lanes::splat(simd, upper);
+            guards.per_force = Lanes::splat(simd, per_force);
+            let path: Polynomial = std::array::from_fn(|k| {
+                argument[k].as_slice()[0] + per_force * force[k].as_slice()[0]
+            });
+            prop_assume!(path[0] > 1e-6 && path[0] < upper);
+            let wanted = first_beyond(&path, 0.0, upper);
+            let room = guards.room(&argument, &force, Lanes::splat(simd, STEP_S));
+            let found = guards.first_end(0, &argument, &force, STEP_S);
+            if let Some((found_s, bound)) = found {
+                let distance = (roots::value(&path, found_s) - bound).abs();
+                prop_assert!(distance < 1e-9, "{distance} from {bound} at {found_s} s");
+            }
+            if let Some(wanted_s) = wanted {
+                prop_assert!(room.as_slice()[0] <= 0.0);
+                // A dip between two samples comes before the first one beyond.
+                prop_assert!(found.is_some_and(|(found_s, _)| found_s <= wanted_s));
+            }
+        }
+    }
+}
