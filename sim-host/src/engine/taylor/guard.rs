@@ -246,9 +246,10 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(3000))]
 
         /// Where there is room the bounds are kept; where they are not, the first instant beyond them is found, also of a path that
-        /// comes back within the step.
+        /// comes back within the step, and of one that has just left the bound, with or without a speed.
         #[test]
         fn no_end_of_a_mode_is_missed(
+            zeros in 0_usize..3,
             above in 0.0..1.0,
             share in 0.05..1.5,
             depth in -0.3..0.3,
@@ -258,9 +259,9 @@ mod tests {
             force in proptest::collection::vec(-1.0..1.0, 4),
         ) {
             let simd = Scalar::new();
-            let mut terms = dip(above, share, depth);
-            terms.extend(higher);
-            let (argument, force) = (series(&terms), series(&force));
+            let behind = |terms: Vec<f64>| [vec![0.0; zeros], terms].concat();
+            let terms = behind([dip(above, share, depth), higher].concat());
+            let (argument, force) = (series(&terms), series(&behind(force)));
             let mut guards = Guards::<Lanes<Scalar, 1>>::none(simd);
             guards.lower = Lanes::splat(simd, 0.0);
             guards.upper = Lanes::splat(simd, upper);
@@ -268,7 +269,7 @@ mod tests {
             let path: Polynomial = std::array::from_fn(|k| {
                 argument[k].as_slice()[0] + per_force * force[k].as_slice()[0]
             });
-            prop_assume!(path[0] > 1e-6 && path[0] < upper);
+            prop_assume!(path[zeros] > 1e-6 && path[0] < upper);
             let wanted = first_beyond(&path, 0.0, upper);
             let room = guards.room(&argument, &force, Lanes::splat(simd, STEP_S));
             let found = guards.first_end(0, &argument, &force, STEP_S);
