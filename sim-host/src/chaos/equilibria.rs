@@ -6,7 +6,7 @@
 //! *stick band* around it, in which |r_s tau_M - tau_a| <= tau_c. The printed law is constant on either side of
 //! delta_f = 0; reported are the balances with that torque on the side on which it acts.
 
-use crate::chaos::polynomial::{Complex, eigenvalues, solve};
+use crate::chaos::eigenvalues::{Eigenvalue, eigenvalues};
 use crate::chaos::sweep::{Parameter, SweepError, Values, Watch, scenarios};
 use crate::engine::dual::Dual;
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector3, Vector4};
@@ -43,7 +43,7 @@ pub struct StickBand {
     /// The end with tau_c.
     pub upper: [f64; 4],
     /// Eigenvalues of sideslip and yaw rate with the steering held, at the middle, 1/s.
-    pub eigenvalues_per_s: Vec<Complex>,
+    pub eigenvalues_per_s: Vec<Eigenvalue>,
     /// These have negative real parts: with the steering held the motion comes to rest.
     pub stable: bool,
 }
@@ -58,7 +58,7 @@ pub struct Equilibrium {
     /// Slip angles of front and rear tyres, rad.
     pub slip_angles_rad: [f64; 2],
     /// Eigenvalues of the motion beside it, friction constant, greatest real part first, 1/s.
-    pub eigenvalues_per_s: Vec<Complex>,
+    pub eigenvalues_per_s: Vec<Eigenvalue>,
     /// All real parts are negative.
     pub stable: bool,
     /// The continuum around it, with Coulomb friction that can stick.
@@ -84,7 +84,7 @@ impl Equilibrium {
     }
 
     /// The pair of complex eigenvalues with the greatest real part, by the one with positive imaginary part.
-    pub fn leading_pair(&self) -> Option<Complex> {
+    pub fn leading_pair(&self) -> Option<Eigenvalue> {
         self.eigenvalues_per_s.iter().copied().find(|e| e.im > 0.0)
     }
 }
@@ -163,7 +163,7 @@ impl Balance {
             rates[STEERING_RATE] -= held_nm / self.steering_inertia_kg_m2;
             let residual = Vector3::from_fn(|row, _| rates[ROWS[row]]);
             let matrix = Matrix3::from_fn(|row, column| jacobian[(ROWS[row], COLUMNS[column])]);
-            let step = solve(matrix, residual)?;
+            let step = matrix.lu().solve(&residual)?;
             for (row, column) in COLUMNS.into_iter().enumerate() {
                 x[column] -= step[row];
             }

@@ -13,10 +13,11 @@
 //! | what does a motion end on? | [`attractor`], [`basin`] |
 //! | what becomes of it along a parameter? | [`orbit`], [`regions`], [`sweep`] |
 //! | where does it cross a section, and which frequencies are in it? | [`poincare`], [`power_spectrum`] |
-//! | where can it rest, and is that stable? | [`equilibria`], [`polynomial`] |
+//! | where can it rest, and is that stable? | [`equilibria`], [`eigenvalues`] |
 
 pub mod attractor;
 pub mod basin;
+pub mod eigenvalues;
 pub mod equilibria;
 pub mod extrema;
 pub mod fixed_step;
@@ -27,7 +28,6 @@ pub mod observe;
 pub mod orbit;
 pub mod period;
 pub mod poincare;
-pub mod polynomial;
 pub mod power_spectrum;
 pub mod regions;
 pub mod sweep;

@@ -7,7 +7,7 @@ use anyhow::{bail, ensure};
 use serde::Serialize;
 use shared_model::vehicle::STEERING_ANGLE;
 use sim_host::chaos::equilibria::{Equilibrium, Hopf, hopf, over_speed};
-use sim_host::chaos::polynomial::Complex;
+use sim_host::chaos::eigenvalues::Eigenvalue;
 use sim_host::chaos::sweep::Values;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 
@@ -93,7 +93,7 @@ struct Row {
 
 impl Row {
     fn new(wheel_speed_rpm: f64, equilibrium: &Equilibrium) -> Self {
-        let zero = Complex { re: 0.0, im: 0.0 };
+        let zero = Eigenvalue { re: 0.0, im: 0.0 };
         let eigenvalue = |k: usize| equilibrium.eigenvalues_per_s.get(k).unwrap_or(&zero);
         let band = equilibrium.stick_band.as_ref();
         Self {
@@ -190,7 +190,7 @@ fn show_speed(speed: &Speed) {
     for equilibrium in &speed.equilibria {
         let [beta, gamma, delta, _] = equilibrium.state;
         let eigenvalues = &equilibrium.eigenvalues_per_s;
-        let eigenvalues: Vec<_> = eigenvalues.iter().map(Complex::to_string).collect();
+        let eigenvalues: Vec<_> = eigenvalues.iter().map(Eigenvalue::to_string).collect();
         let stability = if equilibrium.stable {
             "stable"
         } else {
