@@ -6,8 +6,8 @@ use super::{Done, RunOptions};
 use anyhow::{bail, ensure};
 use serde::Serialize;
 use shared_model::vehicle::STEERING_ANGLE;
-use sim_host::chaos::equilibria::{Equilibrium, Hopf, hopf, over_speed};
 use sim_host::chaos::eigenvalues::Eigenvalue;
+use sim_host::chaos::equilibria::{Equilibrium, Hopf, hopf, over_speed};
 use sim_host::chaos::sweep::Values;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 
