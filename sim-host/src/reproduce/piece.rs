@@ -4,6 +4,7 @@ use super::claims::Judgement;
 use super::{
     Made, Options, Quality, characteristics, errata, figures, measures, sensitivity, sweeps,
 };
+use crate::chaos::observe::is_fit;
 use crate::chaos::sweep::Watch;
 use crate::report::chart::Chart;
 use crate::report::file;
@@ -88,21 +89,22 @@ pub struct Product {
 struct Part {
     name: &'static str,
     title: &'static str,
-    /// Its share of the time, measured in seconds on two cores at full quality.
-    weight: f64,
+    /// Its share of the time, measured in seconds on two cores at full quality: where the engine follows the motions, and where the
+    /// fixed step does.
+    weights: [f64; 2],
     make: fn(&Named, Quality, Watch) -> Made,
 }
 
 const fn part(
     name: &'static str,
     title: &'static str,
-    weight: f64,
+    weights: [f64; 2],
     make: fn(&Named, Quality, Watch) -> Made,
 ) -> Part {
     Part {
         name,
         title,
-        weight,
+        weights,
         make,
     }
 }
@@ -111,7 +113,7 @@ const fn part(
 const ONCE: [Part; 1] = [part(
     "sensitivity",
     "How the edges move",
-    37.0,
+    [2.3, 2.3],
     sensitivity::sensitivity,
 )];
 
@@ -119,53 +121,63 @@ const PARTS: [Part; 10] = [
     part(
         "characteristics",
         "Figures 2, 9 to 11 and 14 to 16: tyres and effective nonlinearities; realisability",
-        0.1,
+        [0.1, 0.1],
         characteristics::characteristics,
     ),
     part(
         "speed",
         "Figures 6 and 7: sweep over the speed",
-        16.0,
+        [0.3, 12.8],
         sweeps::speed,
     ),
     part(
         "square",
         "Figure 8: sweep over the square dither's amplitude",
-        8.0,
+        [0.1, 6.6],
         sweeps::square,
     ),
     part(
         "sine",
         "Figure 13: sweep over the sine dither's amplitude",
-        13.0,
+        [0.2, 9.1],
         sweeps::sine,
     ),
     part(
         "suppression",
         "Figures 12 and 17: chaos suppressed",
-        0.2,
+        [0.1, 0.1],
         figures::suppression,
     ),
     part(
         "exponents",
         "All Lyapunov exponents, by three methods",
-        16.5,
+        [8.5, 10.9],
         measures::exponents,
     ),
-    part("lengths", "How long is long enough", 5.0, measures::lengths),
+    part(
+        "lengths",
+        "How long is long enough",
+        [0.5, 8.4],
+        measures::lengths,
+    ),
     part(
         "motion",
         "Poincar\u{e9} section and frequency spectrum",
-        0.5,
+        [0.2, 0.3],
         measures::motion,
     ),
     part(
         "averaging",
         "Averaging against the true signal",
-        5.5,
+        [5.5, 5.0],
         figures::averaging,
     ),
-    part("errata", "What the print gets wrong", 2.4, errata::errata),
+    part(
+        "errata",
+        "What the print gets wrong",
+        [0.7, 1.1],
+        errata::errata,
+    ),
 ];
 
 /// All pieces in the order of the page.
@@ -173,11 +185,12 @@ pub fn all(options: &Options) -> Vec<Piece> {
     let mut pieces = Vec::new();
     for (k, (name, scenario)) in options.scenarios.iter().enumerate() {
         let once = if k == 0 { ONCE.as_slice() } else { &[] };
+        let by_engine = is_fit(scenario).unwrap_or(false);
         for part in PARTS.iter().chain(once) {
             pieces.push(Piece {
                 name: format!("{}-{name}", part.name),
                 title: format!("{} ({name})", part.title),
-                weight: part.weight,
+                weight: part.weights[usize::from(!by_engine)],
                 scenario: Named {
                     name: name.clone(),
                     scenario: *scenario,
