@@ -42,8 +42,6 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize, E: Equatio
     lanes: Vec<Option<Motion<'a, K>>>,
     /// How many lanes have a motion.
     aboard: usize,
-    /// Whose turn it is to wait.
-    turn: usize,
     results: Vec<Result<K>>,
     /// Index of the friction law's argument in a state, if a mode can end at all.
     argument: Option<usize>,
@@ -72,7 +70,6 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             steps: 0,
             lanes: (0..Lanes::<S, V>::COUNT).map(|_| None).collect(),
             aboard: 0,
-            turn: 0,
             results: Vec::new(),
             argument: like.argument(),
             expansion: Expansion::new(simd, &like.model, like.injection),

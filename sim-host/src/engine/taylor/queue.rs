@@ -3,7 +3,6 @@
 use super::motion::{Found, Task};
 use shared_model::friction::FrictionMode;
 use shared_model::vehicle::{STEERING_RATE, State};
-use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard};
 
 /// Longest step, s.
@@ -104,13 +103,14 @@ pub(super) struct Queue<'a, const K: usize> {
 struct Ends<'a, const K: usize> {
     /// Index of the next task that has not begun.
     next: usize,
-    paused: VecDeque<Waiting<'a, K>>,
+    /// Motions that have, each with the time it has come to, s from its start.
+    paused: Vec<(f64, Waiting<'a, K>)>,
 }
 
 impl<'a, const K: usize> Queue<'a, K> {
     /// All tasks, at least one, in their order.
     pub fn new(tasks: &'a [Task], first_s: f64) -> Self {
-        let (next, paused) = (0, VecDeque::new());
+        let (next, paused) = (0, Vec::new());
         let waiting = Mutex::new(Ends { next, paused });
         Self {
             tasks,
@@ -130,24 +130,32 @@ impl<'a, const K: usize> Queue<'a, K> {
         self.tasks.len() - waiting.next + waiting.paused.len()
     }
 
-    /// The one that has waited longest.
+    /// The one that is furthest behind.
     pub fn next(&self) -> Option<Waiting<'a, K>> {
         let mut waiting = self.lock();
         let index = waiting.next;
         let Some(task) = self.tasks.get(index) else {
-            return waiting.paused.pop_front();
+            return waiting.furthest_behind();
         };
         waiting.next += 1;
         let numbers = Numbers::at(&task.start, self.first_s);
         Some((Motion::at_start(index, task), numbers))
     }
 
-    /// Lets a motion wait behind all others.
-    pub fn push(&self, motion: Waiting<'a, K>) {
-        self.lock().paused.push_back(motion);
+    /// Lets a motion wait that has come to `time_s` from its start.
+    pub fn push(&self, time_s: f64, motion: Waiting<'a, K>) {
+        self.lock().paused.push((time_s, motion));
     }
 
     fn lock(&self) -> MutexGuard<'_, Ends<'a, K>> {
         self.waiting.lock().expect("no thread ends with the lock")
+    }
+}
+
+impl<'a, const K: usize> Ends<'a, K> {
+    fn furthest_behind(&mut self) -> Option<Waiting<'a, K>> {
+        let times = self.paused.iter().map(|(time_s, _)| time_s);
+        let (least, _) = times.enumerate().min_by(|a, b| a.1.total_cmp(b.1))?;
+        Some(self.paused.swap_remove(least).1)
     }
 }

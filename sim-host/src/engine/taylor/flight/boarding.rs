@@ -16,16 +16,22 @@ const SHORTEST_STEP_S: f64 = 1e-9;
 const MOST_SHORT_MODES: usize = 1000;
 
 impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, K, E> {
-    /// The last motions share the lanes by turns, so that none of them is left to go on alone at the end.
+    /// The last motions take turns in the lanes: the one furthest ahead waits for the one furthest behind, so that all end together and
+    /// no lane is empty for long.
     #[inline(never)]
     pub(super) fn take_turns(&mut self) {
         if !(1..=self.lanes.len()).contains(&self.queue.len()) {
             return;
         }
-        self.turn = (self.turn + 1) % self.lanes.len();
-        if let Some(motion) = self.take(self.turn) {
-            self.queue.push(motion);
-            self.load_next(self.turn);
+        let aboard = (0..self.lanes.len()).filter(|&lane| self.lanes[lane].is_some());
+        let ahead = aboard.max_by(|&a, &b| self.time_s(a).total_cmp(&self.time_s(b)));
+        let Some(lane) = ahead else {
+            return;
+        };
+        let time_s = self.time_s(lane);
+        if let Some(motion) = self.take(lane) {
+            self.queue.push(time_s, motion);
+            self.load_next(lane);
         }
     }
 
