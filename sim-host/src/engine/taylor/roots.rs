@@ -70,8 +70,11 @@ pub(super) fn roots(polynomial: &Polynomial, end: f64, mut see: impl FnMut(f64, 
         rate: rate[0],
     };
     let last = Point::at(polynomial, &rate, end);
-    if is_monotone(&rate, end) {
-        if begin.is_below() != last.is_below() {
+    let changes = begin.is_below() != last.is_below();
+    let bend = derivative(&rate);
+    if keeps_its_sign(&rate, end) || (changes && keeps_its_sign(&bend, end)) {
+        // Without a turning point there is one root at most, without an inflection one between two signs.
+        if changes {
             see(refine(polynomial, &rate, begin, last), begin.is_below());
         }
         return;
@@ -87,15 +90,14 @@ pub(super) fn roots(polynomial: &Polynomial, end: f64, mut see: impl FnMut(f64, 
     }
 }
 
-/// The linear term outweighs all others within (0, `end`), given the derivative: the usual case, in which there is at most one
-/// root.
+/// The constant term outweighs all others within (0, `end`).
 #[inline(always)]
-fn is_monotone(rate: &Polynomial, end: f64) -> bool {
+fn keeps_its_sign(polynomial: &Polynomial, end: f64) -> bool {
     let mut others = [0.0; ORDER + 1];
     for k in 1..ORDER {
-        others[k] = rate[k].abs();
+        others[k] = polynomial[k].abs();
     }
-    rate[0].abs() > value(&others, end)
+    polynomial[0].abs() > value(&others, end)
 }
 
 /// Coefficients in Bernstein's basis of degree ORDER on [0, `end`].
