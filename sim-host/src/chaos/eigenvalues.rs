@@ -24,15 +24,16 @@ impl std::fmt::Display for Eigenvalue {
     }
 }
 
-/// Eigenvalues of a matrix, the greatest real part first, of a pair the positive imaginary part first. None if its numbers are
-/// not finite.
+/// Eigenvalues of a matrix, the greatest real part first, of a pair the positive imaginary part first; not a number, each of
+/// them, if the matrix's numbers are not finite.
 ///
 /// By the real Schur decomposition. Good to some 1e-10 of the largest for the distinct ones of well scaled matrices; near a
 /// double one to the square root of that.
 pub fn eigenvalues<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Vec<Eigenvalue> {
     let matrix = DMatrix::from_column_slice(N, N, matrix.as_slice());
     let Some(schur) = Schur::try_new(matrix, f64::EPSILON, MOST_ITERATIONS) else {
-        return Vec::new();
+        let (re, im) = (f64::NAN, f64::NAN);
+        return vec![Eigenvalue { re, im }; N];
     };
     let values = schur.complex_eigenvalues();
     let mut values: Vec<_> = values
@@ -67,6 +68,7 @@ mod tests {
             let apart = (found.re - re).hypot(found.im - im);
             assert!(apart < 1e-10, "{found}");
         }
-        assert!(eigenvalues(&Matrix4::from_element(f64::NAN)).is_empty());
+        let of_none = eigenvalues(&Matrix4::from_element(f64::NAN));
+        assert!(of_none.len() == 4 && of_none.iter().all(|e| e.re.is_nan()));
     }
 }

@@ -170,10 +170,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         if room.zero().all_less(room) {
             return;
         }
-        let mut rest = room.at_most_zero();
-        while rest != 0 {
-            let lane = rest.trailing_zeros() as usize;
-            rest &= rest - 1;
+        for lane in room.at_most_zero() {
             let most_s = &mut step_s.as_mut_slice()[lane];
             if let Some((instant_s, bound)) = self.guards.first_end(lane, x, force, *most_s) {
                 *most_s = instant_s;

@@ -17,6 +17,28 @@ pub(super) struct Lanes<S: Simd, const V: usize> {
     vectors: [S::f64s; V],
 }
 
+/// Some of the lanes, a bit each.
+pub(super) struct LaneSet(u32);
+
+impl LaneSet {
+    /// No lane.
+    pub const NONE: Self = Self(0);
+}
+
+impl Iterator for LaneSet {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let lane = self.0.trailing_zeros() as usize;
+        self.0 &= self.0 - 1;
+        Some(lane)
+    }
+}
+
 impl<S: Simd, const V: usize> Lanes<S, V> {
     /// How many there are.
     pub const COUNT: usize = V * S::F64_LANES;
@@ -62,14 +84,14 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
         bytemuck::cast_slice_mut(&mut self.vectors)
     }
 
-    /// Lanes with a number of at most zero, a bit each.
+    /// Lanes with a number of at most zero, in their order.
     #[inline(always)]
-    pub fn at_most_zero(&self) -> u32 {
+    pub fn at_most_zero(&self) -> LaneSet {
         let mut bits = 0;
         for lane in 0..Self::COUNT {
             bits |= u32::from(self.as_slice()[lane] <= 0.0) << lane;
         }
-        bits
+        LaneSet(bits)
     }
 
     /// `self * factor + sum`, rounded once.

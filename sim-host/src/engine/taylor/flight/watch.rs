@@ -2,7 +2,7 @@
 
 use super::Flight;
 use crate::engine::taylor::equation::Equation;
-use crate::engine::taylor::lanes::Lanes;
+use crate::engine::taylor::lanes::{LaneSet, Lanes};
 use crate::engine::taylor::motion::Crossing;
 use crate::engine::taylor::roots::{self, derivative};
 use crate::engine::taylor::series::{ORDER, Series, of_lane, value};
@@ -21,16 +21,9 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         for k in 0..ORDER {
             rate[k] = x[k + 1].scale((k + 1) as f64);
         }
-        let clear =
-            clearance(&rate, value(&rate, *step_s), *step_s) + Lanes::splat(self.simd, RATE_FLOOR);
-        let bend = bend(&rate, *step_s);
-        if bend.all_less(clear) {
-            return;
-        }
-        for lane in 0..Lanes::<S, V>::COUNT {
-            if bend.as_slice()[lane] < clear.as_slice()[lane] {
-                continue;
-            }
+        let floor = Lanes::splat(self.simd, RATE_FLOOR);
+        let clear = clearance(&rate, value(&rate, *step_s), *step_s) + floor;
+        for lane in lanes_with_roots(clear, bend(&rate, *step_s)) {
             let most_s = step_s.as_slice()[lane];
             let begin_s = self.time_s(lane);
             let path = of_lane(&self.expansion.x[component], lane);
@@ -71,14 +64,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         let mut series = self.expansion.x[component];
         series[0] = series[0] - level_lanes;
         let clear = clearance(&series, next[component] - level_lanes, *step_s);
-        let bend = bend(&series, *step_s);
-        if bend.all_less(clear) {
-            return;
-        }
-        for lane in 0..Lanes::<S, V>::COUNT {
-            if bend.as_slice()[lane] < clear.as_slice()[lane] {
-                continue;
-            }
+        for lane in lanes_with_roots(clear, bend(&series, *step_s)) {
             let most_s = step_s.as_slice()[lane];
             let begin_s = self.time_s(lane);
             let height = of_lane(&series, lane);
@@ -106,6 +92,15 @@ fn log_length<S: Simd, const V: usize>(tangent: &[Series<S, V>; 4], lane: usize,
         square += roots::value(&of_lane(series, lane), t).powi(2);
     }
     0.5 * square.ln()
+}
+
+/// Lanes in which a polynomial may have roots: its chord is no clearer of zero than it bends.
+#[inline(always)]
+fn lanes_with_roots<S: Simd, const V: usize>(clear: Lanes<S, V>, bend: Lanes<S, V>) -> LaneSet {
+    if bend.all_less(clear) {
+        return LaneSet::NONE;
+    }
+    (clear - bend).at_most_zero()
 }
 
 /// Bound on how far a polynomial is from its chord within (0, `t`).
