@@ -26,6 +26,8 @@ compile_error!(
     "sim-host needs Linux: it ends the emulator with itself, and keeps both on one core, by Linux's own calls"
 );
 
+pub use dynamics::{engine, motion};
+
 pub mod averaging;
 pub mod chaos;
 pub mod characteristics;
@@ -33,12 +35,10 @@ pub mod closed_loop;
 pub mod component;
 pub mod config;
 pub mod convergence;
-pub mod engine;
 pub mod equivalence;
 pub mod image;
 pub mod instructions;
 pub mod map;
-pub mod motion;
 pub mod paper;
 pub mod pil;
 pub mod realisability;

@@ -1,16 +1,8 @@
 //! A recorded motion: states at a fixed step, and the duty codes of the PWM.
 
+use dynamics::motion::is_bounded;
 use nalgebra::Vector4;
-use shared_model::Real;
 use shared_model::vehicle::State;
-
-/// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
-pub(crate) const BOUND: f64 = 1e3;
-
-/// Whether a state vector is one of a vehicle at all: finite, and within any bounds that one could keep.
-pub fn is_bounded<T: Real>(x: &Vector4<T>) -> bool {
-    x.iter().all(|value| value.to_f64().abs() < BOUND)
-}
 
 /// A motion sampled at every model step.
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! What the Lyapunov exponents are measured on: anything that has a state vector and steps.
 
 use crate::motion::Motion;
-use crate::trace::is_bounded;
+use crate::motion::is_bounded;
 use nalgebra::{SVector, Vector4};
 use shared_model::dither::Injection;
 use shared_model::vehicle::{Model, State};

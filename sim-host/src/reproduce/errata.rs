@@ -4,7 +4,7 @@ use super::piece::{Material, Named};
 use super::{Made, Quality};
 use crate::chaos::attractor::attractor;
 use crate::chaos::sweep::{SweepError, Timing, Watch};
-use crate::trace::is_bounded;
+use crate::motion::is_bounded;
 use nalgebra::Vector4;
 use shared_model::Scenario;
 use shared_model::dither::{Injection, Waveform};

@@ -1,9 +1,17 @@
 //! The vehicle's motion on its own, without PWM and telemetry: what sweeps and analyses step.
 
-use crate::trace::is_bounded;
+use nalgebra::Vector4;
 use shared_model::dither::{Application, Injection};
 use shared_model::vehicle::{Model, State};
 use shared_model::{InvalidScenario, Real, Scenario, integrate};
+
+/// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
+pub(crate) const BOUND: f64 = 1e3;
+
+/// Whether a state vector is one of a vehicle at all: finite, and within any bounds that one could keep.
+pub fn is_bounded<T: Real>(x: &Vector4<T>) -> bool {
+    x.iter().all(|value| value.to_f64().abs() < BOUND)
+}
 
 /// The motion left all physical bounds: angles in rad and rates in rad/s below a thousand.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, serde::Serialize)]

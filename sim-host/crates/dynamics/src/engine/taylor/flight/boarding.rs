@@ -5,8 +5,7 @@ use crate::engine::taylor::equation::Equation;
 use crate::engine::taylor::lanes::Lanes;
 use crate::engine::taylor::queue::{Numbers, Waiting};
 use crate::engine::taylor::series::Series;
-use crate::motion::Diverged;
-use crate::trace::BOUND;
+use crate::motion::{BOUND, Diverged};
 use pulp::Simd;
 use shared_model::vehicle::State;
 
