@@ -24,6 +24,7 @@ pub mod serial;
 pub mod servo;
 pub mod settings;
 pub mod signal;
+pub mod stability;
 pub mod steering;
 pub mod telemetry;
 pub mod tire;

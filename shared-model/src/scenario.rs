@@ -7,6 +7,7 @@ use crate::friction::{Friction, FrictionLaw};
 use crate::gate::Limits;
 use crate::parameter::{Field, OutOfRange, ParameterSet};
 use crate::servo::Servo;
+use crate::stability::{MOST_STEP_TIMES_RATE, fastest_rate_per_s};
 use crate::steering::Steering;
 use crate::tire::{LOW_FRICTION_ROAD, MagicFormula, TireModel};
 use crate::vehicle::{SlipForm, Vehicle};
@@ -282,7 +283,25 @@ impl<T: Real> Scenario<T> {
         self.run.validate()?;
         self.validate_rates()?;
         self.validate_frequency()?;
-        self.validate_voltage()
+        self.validate_voltage()?;
+        self.validate_step()
+    }
+
+    /// The fixed step must be stable, or its motion is not the model's.
+    fn validate_step(&self) -> Result<(), InvalidScenario> {
+        let rate_hz = self.model_rate_hz().to_f64();
+        let fastest_rate_per_s = fastest_rate_per_s(self);
+        if fastest_rate_per_s <= MOST_STEP_TIMES_RATE * rate_hz {
+            return Ok(());
+        }
+        Err(InvalidScenario::StepTooLong {
+            field: match self.dither.application {
+                Application::Averaged => "run.control_rate_hz",
+                Application::Signal => "run.pwm_rate_hz",
+            },
+            rate_hz,
+            fastest_rate_per_s,
+        })
     }
 
     fn validate_frequency(&self) -> Result<(), InvalidScenario> {
@@ -424,6 +443,15 @@ pub enum InvalidScenario {
         /// Bus voltage, V.
         bus_v: f64,
     },
+    /// The fixed step is too long for the model's fastest rate: its solution would grow where the motion decays.
+    StepTooLong {
+        /// Name of the rate that the model is stepped at.
+        field: &'static str,
+        /// That rate, Hz.
+        rate_hz: f64,
+        /// Fastest rate of the linearised model, 1/s.
+        fastest_rate_per_s: f64,
+    },
 }
 
 impl From<OutOfRange> for InvalidScenario {
@@ -471,6 +499,22 @@ impl fmt::Display for InvalidScenario {
                  {bus_v}; at most {} V are left for the dither",
                 (bus_v - motor_v.abs()).max(0.0)
             ),
+            Self::StepTooLong {
+                field,
+                rate_hz,
+                fastest_rate_per_s,
+            } => {
+                let longest_step_s = MOST_STEP_TIMES_RATE / fastest_rate_per_s;
+                write!(
+                    f,
+                    "{field} = {rate_hz}: the step is too long; {} s times the model's fastest rate, {fastest_rate_per_s:.0} 1/s, \
+                     is {:.2}, and must be at most {MOST_STEP_TIMES_RATE}: at least {} Hz, a step of {longest_step_s:.2e} s",
+                    1.0 / rate_hz,
+                    fastest_rate_per_s / rate_hz,
+                    // Rounded up to a whole number, which the rates must be.
+                    (1.0 / longest_step_s) as u64 + 1
+                )
+            }
         }
     }
 }

@@ -198,6 +198,12 @@ impl<T: Real> Model<T> {
     /// The model of a scenario, which must be valid.
     pub fn new(scenario: &Scenario<T>) -> Self {
         let (vehicle, steering) = (&scenario.vehicle, &scenario.steering);
+        let mut friction = scenario.friction;
+        let friction_limit_nm = friction.limit_nm(steering.pneumatic_trail_m);
+        if friction_limit_nm == T::zero() {
+            // Friction without torque is none. Its modes would change without an effect, and without end where the steering comes to rest.
+            friction.law = FrictionLaw::None;
+        }
         let mut model = Self {
             slip_form: vehicle.slip_form,
             front: Tire::new(scenario.tires.model, &scenario.tires.front),
@@ -212,8 +218,8 @@ impl<T: Real> Model<T> {
             trail_m: steering.trail_m(),
             damping_nm_s_per_rad: steering.damping_nm_s_per_rad,
             inverse_steering_inertia: T::one() / steering.inertia_kg_m2,
-            friction: scenario.friction,
-            friction_limit_nm: scenario.friction.limit_nm(steering.pneumatic_trail_m),
+            friction,
+            friction_limit_nm,
             dither_frequency_rad_per_s: scenario.dither.frequency_rad_per_s(),
         };
         model.set_wheel_speed_rpm(vehicle, scenario.run.wheel_speed_rpm);

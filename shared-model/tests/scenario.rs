@@ -265,7 +265,7 @@ fn voltage_must_fit_the_bus() {
     ];
     assert_eq!(refusal(&left), message.replace("with 3", "with -3"));
     assert_eq!(
-        refusal(&["dither.waveform=square", "dither.amplitude_v=9"]),
+        refusal(&["dither.waveform=sine", "dither.amplitude_v=9"]),
         "accepted"
     );
     assert_eq!(
@@ -278,6 +278,33 @@ fn voltage_must_fit_the_bus() {
         "dither.amplitude_v = 0: with 15 V for the motor current it exceeds servo.bus_voltage_v = 12; at most 0 V are left \
          for the dither"
     );
+}
+
+/// Damping over inertia is 4000 1/s; at 1 rpm the tyres are faster than that; and 9 rad of dither make them as stiff.
+#[test]
+fn the_step_must_be_stable() {
+    let stiff = "steering.inertia_kg_m2=0.05";
+    assert_eq!(
+        refusal(&[stiff]),
+        "run.control_rate_hz = 1000: the step is too long; 0.001 s times the model's fastest rate, 4014 1/s, is 4.01, and must be \
+         at most 2.6: at least 1544 Hz, a step of 6.48e-4 s"
+    );
+    let rates = ["run.control_rate_hz=2000", "run.pwm_rate_hz=10000"];
+    assert_eq!(refusal(&[stiff, rates[0], rates[1]]), "accepted");
+    assert_eq!(refusal(&[stiff, "dither.application=signal"]), "accepted");
+    let far = ["steering.inertia_kg_m2=0.001", "dither.application=signal"];
+    assert!(refusal(&far).starts_with("run.pwm_rate_hz = 10000: the step is too long"));
+    for setting in [
+        &["run.wheel_speed_rpm=1"][..],
+        &["dither.waveform=square", "dither.amplitude_v=9"],
+        &["tires.model=magic_formula", "run.wheel_speed_rpm=1"],
+    ] {
+        let message = refusal(setting);
+        assert!(
+            message.starts_with("run.control_rate_hz = 1000: the step is too long"),
+            "{message}"
+        );
+    }
 }
 
 #[test]

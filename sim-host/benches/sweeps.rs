@@ -205,7 +205,8 @@ fn reference(job: Job) -> Vec<[f64; 4]> {
     if Job::ANALYTIC.contains(&job) {
         let end = |scenario: &Scenario<f64>| {
             let reference = Reference::new(scenario, 1e-13);
-            let state = *reference.expect("it is valid").run(COMPARED_S);
+            let state = reference.expect("it is valid").run(COMPARED_S).cloned();
+            let state = state.expect("it stays bounded");
             state.x.into()
         };
         return job.scenarios().iter().map(end).collect();

@@ -1,6 +1,7 @@
 //! The true dither signal against the averaged system, over the dither's frequency: where averaging starts to hold.
 
 use crate::chaos::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
+use crate::chaos::sweep::SweepError;
 use crate::simulate::{settle, simulate, started_at};
 use crate::trace::Trace;
 use rayon::prelude::*;
@@ -41,7 +42,7 @@ pub struct Comparison {
 pub fn compare(
     scenario: &Scenario<f64>,
     frequencies_rad_per_s: &[f64],
-) -> Result<Vec<Comparison>, InvalidScenario> {
+) -> Result<Vec<Comparison>, SweepError> {
     let start = settle(scenario, TRANSIENT_S)?;
     let mut base = started_at(scenario, &start);
     base.dither.start_time_s = 0.0;
@@ -49,7 +50,7 @@ pub fn compare(
     base.servo.timer_clock_hz = TIMER_CLOCK_HZ;
     frequencies_rad_per_s
         .par_iter()
-        .map(|&frequency| compare_at(&base, frequency))
+        .map(|&frequency| Ok(compare_at(&base, frequency)?))
         .collect()
 }
 

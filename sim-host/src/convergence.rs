@@ -1,9 +1,10 @@
 //! The ECU's fixed step against the reference integrator, over the length of the step.
 
+use crate::chaos::sweep::SweepError;
 use crate::engine::reference::Reference;
 use crate::motion::Motion;
 use serde::Serialize;
-use shared_model::{InvalidScenario, Scenario};
+use shared_model::Scenario;
 
 /// Tolerance of the reference: far below the least error of the fixed step.
 const REFERENCE_TOLERANCE: f64 = 1e-14;
@@ -26,9 +27,9 @@ pub struct Error {
 /// With friction events single orders scatter, because an event lies elsewhere in its step each time; the trend is second order.
 ///
 /// # Errors
-/// If the scenario is not valid.
-pub fn errors(scenario: &Scenario<f64>, time_s: f64) -> Result<Vec<Error>, InvalidScenario> {
-    let end = *Reference::new(scenario, REFERENCE_TOLERANCE)?.run(time_s);
+/// If the scenario is not valid at one of the steps, or the motion leaves all bounds.
+pub fn errors(scenario: &Scenario<f64>, time_s: f64) -> Result<Vec<Error>, SweepError> {
+    let end = *Reference::new(scenario, REFERENCE_TOLERANCE)?.run(time_s)?;
     let mut errors: Vec<Error> = Vec::new();
     for halvings in 0..=6 {
         let mut scenario = *scenario;

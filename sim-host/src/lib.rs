@@ -26,7 +26,7 @@ compile_error!(
     "sim-host needs Linux: it ends the emulator with itself, and keeps both on one core, by Linux's own calls"
 );
 
-pub use dynamics::{engine, motion};
+pub use dynamics::{engine, interrupt, motion};
 
 pub mod averaging;
 pub mod chaos;

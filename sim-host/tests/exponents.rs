@@ -9,6 +9,7 @@ use sim_host::chaos::lyapunov::{Exponent, Spectrum, exponents};
 use sim_host::chaos::synchronisation::{self, NoThreshold, Search};
 use sim_host::chaos::twin;
 use sim_host::engine::dual::Dual;
+use sim_host::motion::Reason;
 
 /// A differential equation by Runge-Kutta of fourth order.
 struct Equation<F> {
@@ -383,13 +384,13 @@ fn what_cannot_be_measured_is_said() {
     let mut scenario = Scenario::reconstruction();
     (scenario.tires.front, scenario.tires.rear) = HIGH_FRICTION_ROAD;
     let flow = VehicleFlow::new(&scenario).expect("the scenario is valid");
-    let diverges = |result: Option<Unmeasured>| matches!(result, Some(Unmeasured::Diverges { .. }));
+    let diverges = |result: Option<Unmeasured>| matches!(result, Some(Unmeasured::EndsEarly(end)) if end.reason == Reason::Diverges);
     let start = flow.start();
     assert!(diverges(settle(&flow, &start, 200.0).err()));
     assert!(diverges(exponents::<4, 4>(&flow, &start, 200.0).err()));
     assert!(diverges(twin::largest(&flow, &start, 200.0).err()));
     assert!(matches!(
         synchronisation::largest(&flow, &start, 200.0, low),
-        Err(NoThreshold::Unmeasured(Unmeasured::Diverges { .. }))
+        Err(NoThreshold::Unmeasured(Unmeasured::EndsEarly(end))) if end.reason == Reason::Diverges
     ));
 }

@@ -197,7 +197,7 @@ fn cells_agree_with_the_analysis_of_the_motion() {
             Kind::Periodic(maxima) => (cell::Kind::Periodic, Some(maxima as u32)),
             Kind::Chaos | Kind::BandedChaos(_) => (cell::Kind::Chaos, None),
             Kind::Undecided => (cell::Kind::Undecided, None),
-            Kind::Diverges => panic!("{case}"),
+            Kind::Diverges | Kind::NotFollowed(_) => panic!("{case}"),
         };
         assert_eq!((cell.kind, cell.period), kind, "{case}");
         let (low, high) = known.yaw_rates_rad_per_s();

@@ -41,7 +41,7 @@ fn a_stick_slip_oscillator_keeps_its_closed_form() {
     let half_period_s = std::f64::consts::PI / 10.0;
     let mut amplitude = 0.105;
     for half in 1..=5 {
-        reference.run(half_period_s);
+        reference.run(half_period_s).expect("it stays bounded");
         amplitude -= 0.02;
         let delta = reference.state().x[STEERING_ANGLE];
         let expected = if half % 2 == 1 { -amplitude } else { amplitude };
@@ -50,7 +50,7 @@ fn a_stick_slip_oscillator_keeps_its_closed_form() {
             "half period {half}: {delta} for {expected}"
         );
     }
-    reference.run(1.0);
+    reference.run(1.0).expect("it stays bounded");
     // 0.005 rad from the middle, within 0.01: stuck for good.
     assert_eq!(reference.state().friction, FrictionMode::Sticking);
     assert_eq!(reference.state().x[STEERING_RATE], 0.0);
@@ -77,7 +77,9 @@ fn the_reference_agrees_with_itself() {
     let run = |tolerance, pieces: u32| {
         let mut reference = Reference::new(&scenario, tolerance).expect("valid");
         for _ in 0..pieces {
-            reference.run(4.0 / f64::from(pieces));
+            reference
+                .run(4.0 / f64::from(pieces))
+                .expect("it stays bounded");
         }
         (reference.state().x, reference.events().to_vec())
     };
@@ -103,7 +105,8 @@ fn observed_order(law: FrictionLaw, halvings: u32) -> f64 {
     let mut scenario = Scenario::<f64>::reconstruction();
     scenario.friction.law = law;
     scenario.servo.timer_clock_hz = 1e6; // fits a period at any of the rates
-    let end = *Reference::new(&scenario, 1e-14).expect("valid").run(4.0);
+    let mut reference = Reference::new(&scenario, 1e-14).expect("valid");
+    let end = *reference.run(4.0).expect("it stays bounded");
     let points: Vec<(f64, f64)> = (0..=4 * halvings)
         .map(|k| {
             scenario.run.control_rate_hz = (250.0 * 2_f64.powf(f64::from(k) / 4.0)).round();

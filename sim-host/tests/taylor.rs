@@ -104,7 +104,7 @@ fn motions_and_events_are_the_references() {
     let mut events = Vec::new();
     for (scenario, found) in scenarios.iter().zip(found) {
         let mut reference = Reference::new(scenario, 1e-13).expect("it is valid");
-        let end = *reference.run(5.0);
+        let end = *reference.run(5.0).expect("it stays bounded");
         let error = (found.end.x - end.x).amax();
         let what = (
             scenario.run.wheel_speed_rpm,
@@ -130,6 +130,7 @@ fn the_tolerance_is_kept() {
             Reference::new(scenario, 1e-14)
                 .expect("it is valid")
                 .run(3.0)
+                .expect("it stays bounded")
                 .x
         })
         .collect();
@@ -163,7 +164,7 @@ fn turning_points_and_extents_are_exact() {
     let (mut crossings, mut maxima) = (0, 0);
     let mut before = (reference.state().x[1], f64::NEG_INFINITY);
     for _ in 0..80_000 {
-        let x = reference.run(1e-4).x;
+        let x = reference.run(1e-4).expect("it stays bounded").x;
         (lower, upper) = (lower.zip_map(&x, f64::min), upper.zip_map(&x, f64::max));
         crossings += usize::from((before.0 < 0.1) != (x[1] < 0.1));
         maxima += usize::from(before.1 > 0.0 && x[1] < before.0);

@@ -6,7 +6,7 @@ use crate::chaos::observe::observe;
 use crate::chaos::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
 use crate::chaos::sweep::{Timing, Watch};
 use crate::engine::taylor::{Found, Watched};
-use crate::motion::Diverged;
+use crate::motion::{EarlyEnd, Reason};
 use shared_model::vehicle::{STEERING_ANGLE, State, YAW_RATE};
 use shared_model::{InvalidScenario, Scenario};
 
@@ -37,12 +37,19 @@ pub enum Kind {
     Undecided,
     /// The motion leaves all bounds.
     Diverges,
+    /// The integrator could not follow the motion.
+    NotFollowed(Reason),
 }
 
 impl Kind {
     /// Chaos, in however many bands.
     pub fn is_chaotic(self) -> bool {
         matches!(self, Self::Chaos | Self::BandedChaos(_))
+    }
+
+    /// The motion has an attractor that was followed to the end of the run.
+    pub fn stays(self) -> bool {
+        !matches!(self, Self::Diverges | Self::NotFollowed(_))
     }
 }
 
@@ -55,6 +62,7 @@ impl std::fmt::Display for Kind {
             Self::BandedChaos(bands) => write!(f, "{bands}-band chaos"),
             Self::Undecided => f.write_str("undecided"),
             Self::Diverges => f.write_str("diverges"),
+            Self::NotFollowed(reason) => write!(f, "{reason}"),
         }
     }
 }
@@ -85,10 +93,20 @@ pub struct Attractor {
     pub diverges_at_s: Option<f64>,
 }
 
+impl From<EarlyEnd> for Kind {
+    fn from(end: EarlyEnd) -> Self {
+        match end.reason {
+            Reason::Diverges => Self::Diverges,
+            reason => Self::NotFollowed(reason),
+        }
+    }
+}
+
 impl Attractor {
-    fn diverging(diverged: Diverged, end: &State<f64>) -> Self {
+    fn ending_early(early: EarlyEnd, end: &State<f64>) -> Self {
+        let kind = Kind::from(early);
         Self {
-            kind: Kind::Diverges,
+            kind,
             residual: None,
             cycle_s: None,
             exponent_per_s: None,
@@ -97,14 +115,14 @@ impl Attractor {
             lower: end.x.into(),
             upper: end.x.into(),
             end: end.x.into(),
-            diverges_at_s: Some(diverged.time_s),
+            diverges_at_s: (kind == Kind::Diverges).then_some(early.time_s),
         }
     }
 
     /// Of what is found of a motion; with an exponent if there is a tangent vector.
     fn of<const K: usize>(found: &Found<K>, timing: Timing) -> Self {
-        if let Some(diverged) = found.diverged {
-            return Self::diverging(diverged, &found.end);
+        if let Some(early) = found.early_end {
+            return Self::ending_early(early, &found.end);
         }
         let range = found.upper[YAW_RATE] - found.lower[YAW_RATE];
         let maxima = maxima_of_turns(&found.turns[YAW_RATE], range);
@@ -151,13 +169,13 @@ impl Attractor {
 
     /// The two are the same attractor: of the same kind, and at rest within 1e-4 of each other or in the stick band of the
     /// same of the `equilibria`; in motion with extents in every component that have 97 % in common, 80 % without a period.
-    /// Motions that diverge are the same.
+    /// Motions that diverge are the same, and those that could not be followed for the same reason.
     pub fn is_same(&self, other: &Self, equilibria: &[Equilibrium]) -> bool {
         if self.kind != other.kind {
             return false;
         }
         let common = match self.kind {
-            Kind::Diverges => return true,
+            Kind::Diverges | Kind::NotFollowed(_) => return true,
             Kind::Equilibrium => {
                 let apart = self.end.iter().zip(&other.end).map(|(a, b)| (a - b).abs());
                 let both = |e: &Equilibrium| e.holds(&self.end) && e.holds(&other.end);

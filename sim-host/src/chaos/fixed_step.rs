@@ -8,7 +8,7 @@ use crate::chaos::poincare::{Direction, Section, Step};
 use crate::chaos::sweep::Timing;
 use crate::component::Component;
 use crate::engine::taylor::{Crossing, Found, Watched};
-use crate::motion::{Diverged, Motion};
+use crate::motion::Motion;
 use shared_model::vehicle::State;
 use shared_model::{InvalidScenario, Scenario};
 
@@ -24,9 +24,9 @@ pub fn observe<const K: usize>(
     watched: Watched,
 ) -> Result<Found<K>, InvalidScenario> {
     let mut motion = Motion::new(scenario)?;
-    if let Err(diverged) = motion.observe(timing.transient_s, |_, _| {}) {
+    if let Err(end) = motion.observe(timing.transient_s, |_, _| {}) {
         let mut found = Found::at(motion.state());
-        found.diverged = Some(diverged);
+        found.early_end = Some(end);
         return Ok(found);
     }
     let start = *motion.state();
@@ -66,9 +66,7 @@ pub fn observe<const K: usize>(
     if K > 0 && seen.is_ok() {
         found.growths = pieces(scenario, &start, timing.observed_s)?;
     }
-    found.diverged = seen.err().map(|diverged| Diverged {
-        time_s: timing.transient_s + diverged.time_s,
-    });
+    found.early_end = seen.err().map(|end| end.later_by(timing.transient_s));
     Ok(found)
 }
 

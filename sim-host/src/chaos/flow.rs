@@ -1,7 +1,8 @@
 //! What the Lyapunov exponents are measured on: anything that has a state vector and steps.
 
-use crate::motion::Motion;
-use crate::motion::is_bounded;
+use crate::engine::reference::why_unbounded;
+use crate::interrupt;
+use crate::motion::{EarlyEnd, Motion, Reason, is_bounded};
 use nalgebra::{SVector, Vector4};
 use shared_model::dither::Injection;
 use shared_model::vehicle::{Model, State};
@@ -21,17 +22,20 @@ pub trait Flow<const N: usize> {
     fn contains(&self, x: &SVector<f64, N>) -> bool {
         x.iter().all(|value| value.is_finite())
     }
+
+    /// Why a motion from `start` is at a state that it may not have `time_s` later: it diverges, or the step is too long. Without a
+    /// second integrator there is no telling.
+    fn why_unbounded(&self, _start: &SVector<f64, N>, _time_s: f64) -> Reason {
+        Reason::Diverges
+    }
 }
 
 /// Why a motion has no exponent.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Unmeasured {
-    /// The motion leaves all bounds.
-    #[error("the motion diverges after {time_s:.3} s")]
-    Diverges {
-        /// Time from the start given, s.
-        time_s: f64,
-    },
+    /// The motion, or its numerical solution, leaves all bounds. The time counts from the start given.
+    #[error(transparent)]
+    EndsEarly(#[from] EarlyEnd),
     /// The motion is too short for a standard error.
     #[error("{time_s} s is too short to measure an exponent: at least {least_s} s")]
     TooShort {
@@ -59,14 +63,15 @@ pub fn settle<const N: usize>(
     let mut x = *start;
     for k in 0..steps(flow, time_s) {
         x = flow.step(&x);
-        check(flow, &x, k + 1)?;
+        check(flow, start, &x, k + 1)?;
     }
     Ok(x)
 }
 
-/// An error if the state that the motion has after `steps` steps is none of the system's.
+/// An error if the state that the motion from `start` has after `steps` steps is none of the system's.
 pub(crate) fn check<const N: usize>(
     flow: &impl Flow<N>,
+    start: &SVector<f64, N>,
     x: &SVector<f64, N>,
     steps: usize,
 ) -> Result<(), Unmeasured> {
@@ -74,7 +79,8 @@ pub(crate) fn check<const N: usize>(
         return Ok(());
     }
     let time_s = steps as f64 * flow.step_s();
-    Err(Unmeasured::Diverges { time_s })
+    let reason = flow.why_unbounded(start, time_s);
+    Err(EarlyEnd { time_s, reason }.into())
 }
 
 /// The vehicle under its dither, averaged and on from the start, by the ECU's integrator.
@@ -130,6 +136,7 @@ impl VehicleFlow {
 
 impl Flow<4> for VehicleFlow {
     fn step<T: Real>(&self, x: &Vector4<T>) -> Vector4<T> {
+        interrupt::check();
         // The constants are carried over each time: some forty moves beside thousands of operations.
         let model = self.model.map(&T::from_f64);
         let injection = self.injection.map(T::from_f64);
@@ -147,5 +154,10 @@ impl Flow<4> for VehicleFlow {
 
     fn contains(&self, x: &Vector4<f64>) -> bool {
         is_bounded(x)
+    }
+
+    fn why_unbounded(&self, start: &Vector4<f64>, time_s: f64) -> Reason {
+        let start = self.model.state(*start);
+        why_unbounded(&self.model, self.injection, &start, time_s)
     }
 }

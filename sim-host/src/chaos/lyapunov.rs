@@ -264,7 +264,7 @@ pub(crate) fn growths<const N: usize, const K: usize>(
             }
         }
         done += steps;
-        check(flow, &x, done)?;
+        check(flow, start, &x, done)?;
         Ok(growth)
     })
 }

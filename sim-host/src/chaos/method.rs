@@ -7,7 +7,7 @@ use crate::chaos::sweep::{Timing, Watch};
 use crate::chaos::synchronisation::{self, NoThreshold, Search};
 use crate::chaos::twin;
 use crate::engine::taylor::{Compiled, Tangents, Watched};
-use crate::motion::Diverged;
+use crate::motion::{EarlyEnd, Reason};
 use shared_model::{InvalidScenario, Scenario};
 
 /// How an exponent is measured.
@@ -199,8 +199,8 @@ where
     let watched = Watched::default();
     observe(scenarios, timing, watched, watch, |scenario, found| {
         let pieces = Pieces::<K>::of(found, timing.observed_s);
-        let exponents = match found.diverged {
-            Some(Diverged { time_s }) => Err(Unmeasured::Diverges { time_s }.into()),
+        let exponents = match found.early_end {
+            Some(end) => Err(Unmeasured::from(end).into()),
             None => Ok(pieces.spectrum().to_vec()),
         };
         in_words(scenario, method, None, exponents)
@@ -246,7 +246,10 @@ fn in_words(
         }
         Err(error) => {
             let finding = match error {
-                NoThreshold::Unmeasured(Unmeasured::Diverges { .. }) => Finding::Diverges,
+                NoThreshold::Unmeasured(Unmeasured::EndsEarly(EarlyEnd {
+                    reason: Reason::Diverges,
+                    ..
+                })) => Finding::Diverges,
                 _ => Finding::Untested,
             };
             vec![Estimate {

@@ -4,8 +4,8 @@ use crate::chaos::fixed_step;
 use crate::chaos::lyapunov::{PIECES, WARM_UP};
 use crate::chaos::sweep::{Timing, Watch};
 use crate::engine::taylor::{Compiled, Found, Motions, Span, Tangents, Unfit, Watched};
-use crate::motion::{Diverged, Motion};
-use shared_model::friction::FrictionLaw;
+use crate::motion::{Motion, Reason};
+use shared_model::friction::Sign;
 use shared_model::{InvalidScenario, Scenario};
 
 /// Largest last term of a step's expansion, in rad and rad/s.
@@ -66,7 +66,8 @@ pub(crate) fn is_fit(scenario: &Scenario<f64>) -> Result<bool, InvalidScenario> 
         Err(Unfit::Invalid(error)) => return Err(error),
     }
     let motion = Motion::new(scenario)?;
-    Ok(scenario.friction.law == FrictionLaw::None || motion.model().can_stick(motion.injection()))
+    let (model, injection) = (motion.model(), motion.injection());
+    Ok(model.friction_sign(injection) == Sign::Zero || model.can_stick(injection))
 }
 
 /// What is found of motions behind their transients by the engine, as in [`observe`].
@@ -101,10 +102,17 @@ where
     motions.go_on_from(&settled);
     let mut found = motions.follow::<K>(&observed);
     for (found, settled) in found.iter_mut().zip(settled) {
-        let later = |diverged: Diverged| Diverged {
-            time_s: timing.transient_s + diverged.time_s,
-        };
-        found.diverged = settled.diverged.or(found.diverged.map(later));
+        let later = found.early_end.map(|end| end.later_by(timing.transient_s));
+        found.early_end = settled.early_end.or(later);
+    }
+    for (found, scenario) in found.iter_mut().zip(scenarios) {
+        // What the engine cannot pass between events, the fixed step can.
+        if found
+            .early_end
+            .is_some_and(|end| end.reason != Reason::Diverges)
+        {
+            *found = fixed_step::observe(scenario, timing, watched)?;
+        }
     }
     Ok(found)
 }

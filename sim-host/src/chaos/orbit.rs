@@ -5,7 +5,7 @@ use crate::chaos::period::{AT_REST_RAD_PER_S, maxima_of_turns};
 use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch, scenarios};
 use crate::component::Component;
 use crate::engine::taylor::{Found, Watched};
-use crate::motion::Diverged;
+use crate::motion::{EarlyEnd, Reason};
 use crate::simulate::started_at;
 use shared_model::vehicle::{State, YAW_RATE};
 use shared_model::{InvalidScenario, Scenario};
@@ -92,6 +92,8 @@ pub enum Outcome {
         /// When, s.
         time_s: f64,
     },
+    /// The integrator could not follow it.
+    NotFollowed(EarlyEnd),
 }
 
 /// One value of the parameter.
@@ -157,8 +159,11 @@ fn continued<'a>(
         let Some((point, state)) = follow(&[scenario])?.pop().flatten() else {
             break;
         };
-        let diverges = matches!(point.orbit, Outcome::Diverges { .. });
-        end = (!diverges).then_some(state);
+        let ends_early = matches!(
+            point.orbit,
+            Outcome::Diverges { .. } | Outcome::NotFollowed(_)
+        );
+        end = (!ends_early).then_some(state);
         points.push(point);
     }
     Ok(points)
@@ -186,10 +191,13 @@ fn check_crossed(section: Section, points: &[Point]) -> Result<(), SweepError> {
 
 /// What a motion shows.
 fn point(value: f64, section: Section, found: &Found<0>) -> Point {
-    if let Some(Diverged { time_s }) = found.diverged {
+    if let Some(end) = found.early_end {
         return Point {
             value,
-            orbit: Outcome::Diverges { time_s },
+            orbit: match end.reason {
+                Reason::Diverges => Outcome::Diverges { time_s: end.time_s },
+                _ => Outcome::NotFollowed(end),
+            },
             extent: (0.0, 0.0),
         };
     }

@@ -11,8 +11,9 @@ use crate::chaos::observe::observe;
 use crate::chaos::sweep::{Timing, Watch};
 use crate::component::Component;
 use crate::engine::taylor::{Found, Watched};
-use crate::motion::is_bounded;
-use crate::simulate;
+use crate::interrupt;
+use crate::motion::{EarlyEnd, is_bounded};
+use crate::simulate::{self, Unsettled, started_at};
 use nalgebra::Vector4;
 use serde::Serialize;
 use shared_model::dither::{Application, Injection};
@@ -103,12 +104,18 @@ pub enum SectionError {
         /// Its greatest value.
         high: f64,
     },
-    /// The motion leaves all physical bounds.
-    #[error("the motion diverges within {time_s} s behind the transient")]
-    Diverges {
-        /// Time from the transient's end, s.
-        time_s: f64,
-    },
+    /// The motion leaves all physical bounds, or could not be followed; the time counts from the start.
+    #[error(transparent)]
+    EndsEarly(#[from] EarlyEnd),
+}
+
+impl From<Unsettled> for SectionError {
+    fn from(error: Unsettled) -> Self {
+        match error {
+            Unsettled::Invalid(error) => error.into(),
+            Unsettled::EndsEarly(end) => end.into(),
+        }
+    }
 }
 
 /// Crossings of the section by the motion of a scenario, its dither on from the start, within its length behind a transient
@@ -203,9 +210,8 @@ fn by_engine(
     let see = |_: &_, found: &Found<0>| found.clone();
     let mut found = observe(one, timing, watched, Watch::NOBODY, see)?;
     let found = found.pop().flatten().expect("nobody stops it");
-    if let Some(diverged) = found.diverged {
-        let time_s = (diverged.time_s - transient_s).max(0.0);
-        return Err(SectionError::Diverges { time_s });
+    if let Some(end) = found.early_end {
+        return Err(end.into());
     }
     let wanted = found
         .crossings
@@ -257,8 +263,10 @@ fn for_each_step(
 ) -> Result<(), SectionError> {
     let mut ecu = simulate::after_transient(scenario, transient_s)?;
     let step_s = scenario.step_s();
-    let mut start = *ecu.control.state();
+    let first = *ecu.control.state();
+    let mut start = first;
     for k in 0..scenario.steps() {
+        interrupt::check();
         let dither = loop {
             let sample = ecu.pwm.run();
             if sample.control_due {
@@ -268,7 +276,8 @@ fn for_each_step(
         let end = *ecu.control.run(dither);
         let time_s = f64::from(k) * step_s;
         if !is_bounded(&end.x) {
-            return Err(SectionError::Diverges { time_s });
+            let reason = simulate::why_unbounded(&started_at(scenario, &first), time_s);
+            return Err(EarlyEnd { time_s, reason }.later_by(transient_s).into());
         }
         let step = Step {
             start,
@@ -445,6 +454,6 @@ mod tests {
         scenario.run.duration_s = 20.0;
         let far = section("gamma", 1e3, Direction::Rising);
         let error = crossings(&scenario, 0.0, &far).unwrap_err();
-        assert!(matches!(error, SectionError::Diverges { .. }), "{error}");
+        assert!(matches!(error, SectionError::EndsEarly(_)), "{error}");
     }
 }

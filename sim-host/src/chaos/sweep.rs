@@ -1,5 +1,8 @@
 //! What sweeps share: the parameter that is swept, its values, the times of a run, and the work on many points at once.
 
+use crate::interrupt;
+use crate::motion::EarlyEnd;
+use crate::simulate::Unsettled;
 use rayon::prelude::*;
 use shared_model::dither::Waveform;
 use shared_model::vehicle::State;
@@ -115,6 +118,18 @@ pub enum SweepError {
     /// A point's scenario is not valid.
     #[error("{0}")]
     Scenario(#[from] InvalidScenario),
+    /// A motion that is needed as a start leaves all bounds.
+    #[error(transparent)]
+    EndsEarly(#[from] EarlyEnd),
+}
+
+impl From<Unsettled> for SweepError {
+    fn from(error: Unsettled) -> Self {
+        match error {
+            Unsettled::Invalid(error) => error.into(),
+            Unsettled::EndsEarly(end) => end.into(),
+        }
+    }
 }
 
 /// Equally spaced values.
@@ -259,18 +274,18 @@ impl Watch<'_> {
         done: &|| (),
     };
 
-    /// The result of `work`, unless no point is to be begun any more.
+    /// The result of `work`, unless no point is to be begun any more, or it was interrupted.
     pub fn point<R>(&self, work: impl FnOnce() -> R) -> Option<R> {
         if self.stop.load(Ordering::Relaxed) {
             return None;
         }
-        let result = work();
+        let result = interrupt::catch(work).ok()?;
         (self.done)();
         Some(result)
     }
 
     /// Independent work on many items at once. Results are in the items' order whatever the number of threads; items that
-    /// were not begun have none.
+    /// were not begun, or interrupted, have none.
     pub fn points<T: Sync, R: Send>(
         &self,
         items: &[T],
@@ -291,7 +306,9 @@ impl Watch<'_> {
             if self.stop.load(Ordering::Relaxed) {
                 return batch.iter().map(|_| None).collect();
             }
-            let results = work(batch);
+            let Ok(results) = interrupt::catch(|| work(batch)) else {
+                return batch.iter().map(|_| None).collect();
+            };
             results.iter().for_each(|_| (self.done)());
             results.into_iter().map(Some).collect()
         };

@@ -203,7 +203,7 @@ fn least_coupling<const N: usize>(
         let mut drive = vec![from];
         for k in 0..steps {
             drive.push(flow.step(&drive[k]));
-            check(flow, &drive[k + 1], done + k + 1)?;
+            check(flow, start, &drive[k + 1], done + k + 1)?;
         }
         done += steps;
         Ok::<_, Unmeasured>(drive)
@@ -268,6 +268,10 @@ fn bisect(search: Search, mut follows: impl FnMut(f64) -> bool) -> Result<f64, N
     }
     while above - below > search.tolerance_per_s {
         let middle = 0.5 * (below + above);
+        if middle <= below || middle >= above {
+            // Rounding leaves nothing between them.
+            break;
+        }
         if follows(middle) {
             above = middle;
         } else {

@@ -39,7 +39,7 @@ pub fn largest<const N: usize>(
             }
             left -= stretch;
             done += stretch;
-            check(flow, &x, done)?;
+            check(flow, start, &x, done)?;
             let apart = twin - x;
             let distance = apart.dot(&apart).sqrt();
             growth += (distance / DISTANCE).ln();

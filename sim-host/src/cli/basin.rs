@@ -123,7 +123,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 fn name(attractor: &Attractor) -> String {
     let kind = attractor.kind;
     match kind {
-        Kind::Diverges => kind.to_string(),
+        Kind::Diverges | Kind::NotFollowed(_) => kind.to_string(),
         Kind::Equilibrium => {
             let [beta, _, delta, _] = attractor.end;
             format!("{kind} near beta {beta:.3}, delta_f {delta:.3} rad")

@@ -42,16 +42,18 @@ use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::settings::Choice;
 use sim_host::config::{ConfigError, differences, load, validate};
-use sim_host::pil::qemu::INTERRUPTED;
+use sim_host::interrupt;
+use sim_host::motion::Reason;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Exit code of a failed verdict.
 const FAILED: u8 = 1;
 /// Exit code where the job could not be done.
 const COULD_NOT_RUN: u8 = 2;
+/// Time that an interrupted job has to write its results.
+const GRACE: Duration = Duration::from_millis(900);
 
 /// Host simulator of the steering ECU: compares it with the firmware in QEMU, and shows chaos and its suppression by dither.
 ///
@@ -104,16 +106,36 @@ enum Done {
 /// Runs the command line.
 pub fn main() -> ExitCode {
     let command = Cli::parse().command;
-    // Long jobs look at the flag and end in good order; a second Ctrl-C ends at once.
-    let handler = || {
-        if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            std::process::exit(COULD_NOT_RUN.into());
-        }
-    };
-    if let Err(error) = ctrlc::set_handler(handler) {
+    if let Err(error) = ctrlc::set_handler(end_soon) {
         eprintln!("warning: Ctrl-C ends this program at once: {error}");
     }
-    let done = match command {
+    let done = interrupt::catch(|| run(command));
+    match done.unwrap_or_else(|interrupted| Err(interrupted.into())) {
+        Ok(Done::Well) => ExitCode::SUCCESS,
+        Ok(Done::Failed) => ExitCode::from(FAILED),
+        Ok(Done::Code(code)) => ExitCode::from(code),
+        Err(error) => {
+            eprintln!("error: {}", message(&error));
+            ExitCode::from(COULD_NOT_RUN)
+        }
+    }
+}
+
+/// Ctrl-C or SIGTERM: long jobs end in good order and write the results that are complete. A second one ends them at once, and so does
+/// the end of the grace period.
+fn end_soon() {
+    if interrupt::request() {
+        std::process::exit(COULD_NOT_RUN.into());
+    }
+    std::thread::spawn(|| {
+        std::thread::sleep(GRACE);
+        eprintln!("error: interrupted; what was not written by now is lost");
+        std::process::exit(COULD_NOT_RUN.into());
+    });
+}
+
+fn run(command: Command) -> anyhow::Result<Done> {
+    match command {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Pil(arguments) => pil::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
@@ -138,15 +160,6 @@ pub fn main() -> ExitCode {
         Command::Decode(arguments) => decode::run(&arguments),
         Command::Image(arguments) => image::run(&arguments),
         Command::Qemu(arguments) => qemu::run(&arguments),
-    };
-    match done {
-        Ok(Done::Well) => ExitCode::SUCCESS,
-        Ok(Done::Failed) => ExitCode::from(FAILED),
-        Ok(Done::Code(code)) => ExitCode::from(code),
-        Err(error) => {
-            eprintln!("error: {}", message(&error));
-            ExitCode::from(COULD_NOT_RUN)
-        }
     }
 }
 
@@ -202,6 +215,14 @@ fn say_differences(scenario: &Scenario<f64>) {
             "parameters that differ from the paper's: {}",
             differences.join(", ")
         );
+    }
+}
+
+/// What to do about a motion that ends early.
+fn advice(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Diverges => "Set B of Table 1 with the cubic tyre and a negative peak_n diverge",
+        _ => "Raise run.control_rate_hz, and run.pwm_rate_hz with it",
     }
 }
 

@@ -175,6 +175,7 @@ fn rows(
         Outcome::Misses => vec![row("misses", None, None)],
         Outcome::Rests { value } => vec![row("rests", Some(*value), None)],
         Outcome::Diverges { time_s } => vec![row("diverges", None, Some(*time_s))],
+        Outcome::NotFollowed(_) => vec![row("not_followed", None, None)],
     }
 }
 
@@ -184,10 +185,15 @@ fn summary(results: &Results) -> String {
     let rests = count(|o| matches!(o, Outcome::Rests { .. }));
     let misses = count(|o| matches!(o, Outcome::Misses));
     let diverges = count(|o| matches!(o, Outcome::Diverges { .. }));
+    let not_followed = results.points.iter().find_map(|point| match point.orbit {
+        Outcome::NotFollowed(end) => Some(format!("; at {}: {end}", point.value)),
+        _ => None,
+    });
     format!(
-        "{} values of {}: {met} meet the section, {rests} come to rest, {misses} miss it, {diverges} diverge",
+        "{} values of {}: {met} meet the section, {rests} come to rest, {misses} miss it, {diverges} diverge{}",
         results.points.len(),
-        results.parameter.name()
+        results.parameter.name(),
+        not_followed.unwrap_or_default()
     )
 }
 
@@ -197,7 +203,7 @@ fn chart(results: &Results) -> Chart {
         match &point.orbit {
             Outcome::Meets { values } => values.iter().map(at).collect(),
             Outcome::Rests { value } => vec![(point.value, *value)],
-            Outcome::Misses | Outcome::Diverges { .. } => Vec::new(),
+            Outcome::Misses | Outcome::Diverges { .. } | Outcome::NotFollowed(_) => Vec::new(),
         }
     };
     let (name, shown) = (results.parameter.name(), results.shown.label());

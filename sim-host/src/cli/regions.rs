@@ -129,7 +129,7 @@ fn row<'a>(
     let scenario = parameter.set(scenario, sample.value);
     let attractor = &sample.attractor;
     let (low, high) = attractor.yaw_rates_rad_per_s();
-    let stays = attractor.diverges_at_s.is_none();
+    let stays = attractor.kind.stays();
     Row {
         start,
         wheel_speed_rpm: scenario.run.wheel_speed_rpm,
@@ -211,12 +211,12 @@ fn chart(results: &Results) -> Chart {
             axis
         }
     };
-    let maxima = |sample: &Sample| match sample.attractor.diverges_at_s {
-        Some(_) => Vec::new(),
-        None if sample.attractor.maxima_rad_per_s.is_empty() => {
+    let maxima = |sample: &Sample| match sample.attractor.kind.stays() {
+        false => Vec::new(),
+        true if sample.attractor.maxima_rad_per_s.is_empty() => {
             vec![sample.attractor.yaw_rates_rad_per_s().1]
         }
-        None => sample.attractor.maxima_rad_per_s.clone(),
+        true => sample.attractor.maxima_rad_per_s.clone(),
     };
     let exponent = |sample: &Sample| sample.attractor.exponent_per_s.into_iter().collect();
     let caption = |text: &str| match paper.is_empty() {

@@ -1,10 +1,11 @@
 //! What the plots of a settled motion share: their options, and the motion behind its transient.
 
 use super::RunOptions;
+use super::advice;
 use anyhow::{bail, ensure};
 use clap::Args;
 use shared_model::Scenario;
-use sim_host::simulate::{after_transient, record};
+use sim_host::simulate::{after_transient, early_end, record};
 use sim_host::trace::Trace;
 
 /// Least and greatest transient, s.
@@ -50,12 +51,9 @@ impl SettledRun {
             f64::from(MOST_STATES) * scenario.step_s()
         );
         let trace = record(&mut after_transient(scenario, self.transient)?, scenario);
-        if let Some(time_s) = trace.diverges_at_s() {
-            bail!(
-                "the motion diverges: beyond all bounds {time_s} s behind the transient of {} s; nothing was written. Set B of \
-                 Table 1 with the cubic tyre and a negative peak_n do so",
-                self.transient
-            );
+        if let Some(end) = early_end(scenario, &trace) {
+            let end = end.later_by(self.transient);
+            bail!("{end}; nothing was written. {}", advice(end.reason));
         }
         Ok(trace)
     }

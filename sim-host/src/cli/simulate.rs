@@ -1,9 +1,9 @@
 //! `sim-host simulate`: one run on the host, as CSV.
 
 use super::output::{Output, check_free};
-use super::{Done, RunOptions};
+use super::{Done, RunOptions, advice};
 use anyhow::bail;
-use sim_host::simulate::simulate;
+use sim_host::simulate::{early_end, simulate};
 use sim_host::trace::Trace;
 use std::path::PathBuf;
 
@@ -35,10 +35,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     } else {
         simulate(&scenario)?
     };
-    if let Some(time_s) = trace.diverges_at_s() {
-        bail!(
-            "the motion diverges at {time_s} s; nothing was written. Set B of Table 1 with the cubic tyre and a negative peak_n do so"
-        );
+    if let Some(end) = early_end(&scenario, &trace) {
+        bail!("{end}; nothing was written. {}", advice(end.reason));
     }
     write(&trace, &arguments.out, arguments.force)?;
     say!(

@@ -7,6 +7,7 @@ use crate::chaos::observe::follow;
 use crate::chaos::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
 use crate::chaos::sweep::Timing;
 use crate::engine::taylor::{Found, Unfit, Watched};
+use crate::motion::Reason;
 use serde::{Deserialize, Serialize};
 use shared_model::dither::Waveform;
 use shared_model::vehicle::{STEERING_ANGLE, YAW_RATE};
@@ -33,7 +34,7 @@ impl From<attractor::Kind> for Kind {
             attractor::Kind::Equilibrium => Self::Equilibrium,
             attractor::Kind::Periodic(_) => Self::Periodic,
             attractor::Kind::Chaos | attractor::Kind::BandedChaos(_) => Self::Chaos,
-            attractor::Kind::Undecided => Self::Undecided,
+            attractor::Kind::Undecided | attractor::Kind::NotFollowed(_) => Self::Undecided,
             attractor::Kind::Diverges => Self::Diverges,
         }
     }
@@ -98,8 +99,13 @@ pub fn cells(plan: &Plan, places: &[Place]) -> Result<Vec<Cell>, Unfit> {
     watched.turns[YAW_RATE] = true;
     watched.turns[STEERING_ANGLE] = true;
     let found = follow::<1>(&scenarios, timing, watched)?;
-    let cell = |(place, found): (&Place, &Found<1>)| match found.diverged {
-        Some(diverged) => diverging(place, diverged.time_s),
+    let cell = |(place, found): (&Place, &Found<1>)| match found.early_end {
+        Some(end) if end.reason == Reason::Diverges => diverging(place, end.time_s),
+        Some(_) => Cell {
+            kind: Kind::Undecided,
+            diverges_at_s: None,
+            ..diverging(place, 0.0)
+        },
         None => staying(place, plan, found),
     };
     Ok(places.iter().zip(&found).map(cell).collect())

@@ -6,7 +6,7 @@ pub use crate::pil::socket::SocketError;
 use std::io::Read;
 use std::path::Path;
 use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -14,8 +14,7 @@ use std::time::{Duration, Instant};
 const PROGRAM: &str = "qemu-system-arm";
 const POLL: Duration = Duration::from_millis(5);
 
-/// Set when the user asks to stop; every emulator then ends.
-pub static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+pub use crate::interrupt::REQUESTED as INTERRUPTED;
 
 /// A machine of the emulator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

@@ -5,8 +5,7 @@ use super::map::{Cell, cells};
 use crate::chaos::attractor::Kind;
 use crate::chaos::period::{Period, RIPPLE_TOLERANCE, period};
 use crate::chaos::sweep::{SweepError, Timing, Values, Watch, mirrored};
-use crate::motion::is_bounded;
-use crate::simulate::{after_transient, record, settle, started_at};
+use crate::simulate::{Unsettled, after_transient, early_end, record, settle, started_at};
 use shared_model::Scenario;
 use shared_model::dither::Application;
 use shared_model::schedule::amplitude_v;
@@ -68,19 +67,21 @@ pub(super) fn check(
 
 /// Kind of the motion when the true signal sets in on the settled undithered motion.
 fn under_signal(scenario: &Scenario<f64>, timing: Timing) -> Result<Kind, SweepError> {
-    let settled = settle(scenario, timing.transient_s)?;
-    if !is_bounded(&settled.x) {
-        return Ok(Kind::Diverges);
-    }
+    let settled = match settle(scenario, timing.transient_s) {
+        Err(Unsettled::EndsEarly(end)) => return Ok(end.into()),
+        settled => settled?,
+    };
     let mut scenario = started_at(scenario, &settled);
     scenario.dither.application = Application::Signal;
     scenario.run.duration_s = MOTION_S;
-    let trace = record(
-        &mut after_transient(&scenario, DITHER_TRANSIENT_S)?,
-        &scenario,
-    );
-    if trace.diverges_at_s().is_some() {
-        return Ok(Kind::Diverges);
+    let mut ecu = match after_transient(&scenario, DITHER_TRANSIENT_S) {
+        Err(Unsettled::EndsEarly(end)) => return Ok(end.into()),
+        ecu => ecu?,
+    };
+    let trace = record(&mut ecu, &scenario);
+    scenario.dither.start_time_s = 0.0;
+    if let Some(end) = early_end(&scenario, &trace) {
+        return Ok(end.into());
     }
     let turn_s = std::f64::consts::TAU / scenario.dither.frequency_rad_per_s();
     let slow = trace.smoothed(SMOOTHED_PERIODS * turn_s);

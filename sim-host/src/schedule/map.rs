@@ -52,7 +52,9 @@ impl Class {
             Kind::Equilibrium => Self::Rest,
             Kind::Periodic(1) => Self::PeriodOne,
             Kind::Periodic(_) => Self::PeriodN,
-            Kind::Chaos | Kind::BandedChaos(_) | Kind::Undecided => Self::NoPeriod,
+            Kind::Chaos | Kind::BandedChaos(_) | Kind::Undecided | Kind::NotFollowed(_) => {
+                Self::NoPeriod
+            }
             Kind::Diverges => Self::Diverges,
         }
     }

@@ -9,7 +9,7 @@ use crate::pil::qemu::{self, Finished, Machine, RunError};
 use crate::pil::settings;
 use crate::pil::telemetry::Recording;
 use crate::report::RunReport;
-use crate::simulate::{settle, simulate, started_at};
+use crate::simulate::{Unsettled, early_end, settle, simulate, started_at};
 use crate::trace::Trace;
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
@@ -181,13 +181,20 @@ pub(super) fn run(
     on_progress: &(impl Fn(Progress) + Sync),
 ) -> Result<Outcome, VerifyError> {
     // Both arithmetics start from the same state, so it is one of f32.
-    let start = settle(&case.scenario, TRANSIENT_S)?.map(|value| f64::from(value as f32));
+    let start = match settle(&case.scenario, TRANSIENT_S) {
+        Err(Unsettled::EndsEarly(end)) => {
+            let title = case.title;
+            return Err(VerifyError::EndsEarly { title, end });
+        }
+        Err(Unsettled::Invalid(error)) => return Err(error.into()),
+        Ok(state) => state.map(|value| f64::from(value as f32)),
+    };
     case.scenario = started_at(&case.scenario, &start);
     let rounded = case.scenario.map(&|value| value as f32);
     let host = simulate(&rounded)?;
-    if let Some(time_s) = host.diverges_at_s() {
+    if let Some(end) = early_end(&case.scenario, &host) {
         let title = case.title;
-        return Err(VerifyError::Diverges { title, time_s });
+        return Err(VerifyError::EndsEarly { title, end });
     }
     let (recording, log) = run_firmware(&case, &rounded, options, on_progress)?;
 

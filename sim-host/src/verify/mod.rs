@@ -6,6 +6,7 @@ mod in_loop;
 mod proofs;
 mod suppression;
 
+use crate::motion::EarlyEnd;
 use crate::pil::elf::Image;
 use crate::pil::qemu::RunError;
 use crate::pil::telemetry::TelemetryError;
@@ -38,12 +39,12 @@ pub enum VerifyError {
     #[error(transparent)]
     Scenario(#[from] InvalidScenario),
     /// The motion leaves all bounds, so there is nothing to compare.
-    #[error("{title}: the motion diverges at {time_s} s; there is no attractor to compare on")]
-    Diverges {
+    #[error("{title}: {end}; there is no attractor to compare on")]
+    EndsEarly {
         /// The run.
         title: String,
-        /// When.
-        time_s: f64,
+        /// When and why.
+        end: EarlyEnd,
     },
     /// The user asked to stop.
     #[error("interrupted; no report was written")]

@@ -1,5 +1,7 @@
 //! The vehicle's motion on its own, without PWM and telemetry: what sweeps and analyses step.
 
+use crate::engine::reference::why_unbounded;
+use crate::interrupt;
 use nalgebra::Vector4;
 use shared_model::dither::{Application, Injection};
 use shared_model::vehicle::{Model, State};
@@ -13,12 +15,44 @@ pub fn is_bounded<T: Real>(x: &Vector4<T>) -> bool {
     x.iter().all(|value| value.to_f64().abs() < BOUND)
 }
 
-/// The motion left all physical bounds: angles in rad and rates in rad/s below a thousand.
+/// A trajectory that ended before its time.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, serde::Serialize)]
-#[error("the motion diverges at {time_s} s")]
-pub struct Diverged {
+#[error("{reason} at {time_s} s")]
+pub struct EarlyEnd {
     /// When, s.
     pub time_s: f64,
+    /// Why.
+    pub reason: Reason,
+}
+
+impl EarlyEnd {
+    /// The same, counted from an instant `earlier_s` before.
+    pub fn later_by(self, earlier_s: f64) -> Self {
+        Self {
+            time_s: earlier_s + self.time_s,
+            ..self
+        }
+    }
+}
+
+/// Why a trajectory ended before its time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Reason {
+    /// The solution itself leaves all physical bounds: angles in rad and rates in rad/s below a thousand.
+    #[error("the motion diverges")]
+    Diverges,
+    /// The numerical solution left the bounds, while the solution to a tolerance stays within them: the fixed step is unstable.
+    #[error(
+        "the step is too long: the fixed step is unstable, and the motion itself stays bounded,"
+    )]
+    StepTooLong,
+    /// Mode transitions of the friction follow each other without end: a sliding mode, which an integrator between events cannot pass.
+    #[error("the friction chatters between its modes")]
+    Chattering,
+    /// The tolerance asks for more steps per second of motion than a run may take.
+    #[error("the equations are too stiff for this integrator")]
+    TooManySteps,
 }
 
 /// A motion of the averaged system. The dither, if there is one, is on from the start.
@@ -36,9 +70,9 @@ impl<T: Real> Motion<T> {
     /// # Errors
     /// If the scenario is not valid.
     pub fn new(scenario: &Scenario<T>) -> Result<Self, InvalidScenario> {
-        scenario.validate()?;
         let mut averaged = *scenario;
         averaged.dither.application = Application::Averaged;
+        averaged.validate()?;
         let model = Model::new(&averaged);
         Ok(Self {
             state: model.initial_state(&averaged),
@@ -58,6 +92,7 @@ impl<T: Real> Motion<T> {
     pub fn run(&mut self, time_s: f64) -> &State<T> {
         let steps = (time_s / self.step_s.to_f64()).round() as u64;
         for _ in 0..steps {
+            interrupt::check();
             self.step();
         }
         &self.state
@@ -66,18 +101,25 @@ impl<T: Real> Motion<T> {
     /// Runs as many steps as fit into `time_s`, and shows `see` each state with its time from now, s.
     ///
     /// # Errors
-    /// As soon as the motion leaves all physical bounds; `see` is not shown that state.
+    /// As soon as the state leaves all physical bounds; `see` is not shown that state. The reference integrator decides whether the
+    /// motion itself does, or the step is too long.
     pub fn observe(
         &mut self,
         time_s: f64,
         mut see: impl FnMut(f64, &State<T>),
-    ) -> Result<(), Diverged> {
+    ) -> Result<(), EarlyEnd> {
         let step_s = self.step_s.to_f64();
         let steps = (time_s / step_s).round() as u64;
+        let start = self.state;
         for k in 1..=steps {
+            interrupt::check();
             let time_s = k as f64 * step_s;
             if !is_bounded(&self.step().x) {
-                return Err(Diverged { time_s });
+                let model = self.model.map(&Real::to_f64);
+                let injection = self.injection.map(Real::to_f64);
+                let start = start.map(Real::to_f64);
+                let reason = why_unbounded(&model, injection, &start, time_s);
+                return Err(EarlyEnd { time_s, reason });
             }
             see(time_s, &self.state);
         }

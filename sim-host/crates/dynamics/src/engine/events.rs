@@ -3,13 +3,18 @@
 use nalgebra::Vector4;
 use shared_model::dither::Injection;
 use shared_model::friction::{FrictionMode, Sign};
-use shared_model::vehicle::Model;
+use shared_model::tire::Tire;
+use shared_model::vehicle::{Model, SIDESLIP, STEERING_ANGLE, YAW_RATE};
+
+/// Share of the friction limit by which the torque must exceed it before the steering is released. At rest right at the limit
+/// rounding would otherwise release it and stop it without end.
+const RELEASE_MARGIN: f64 = 1e-10;
+/// Rounding of the driving torque, in units of the last place of its greatest term.
+const ROUNDING_ULPS: f64 = 16.0;
 
 /// The quantity that must stay within bounds for a friction mode to last.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Guard {
-    /// The mode.
-    pub mode: FrictionMode,
     /// The lower bound; minus infinity where there is none. Of the driving torque (N m) while sticking, else of the friction
     /// law's argument (rad or rad/s).
     pub lower: f64,
@@ -18,13 +23,24 @@ pub struct Guard {
 }
 
 impl Guard {
-    /// The bounds of a mode.
-    pub fn of(model: &Model<f64>, injection: Injection<f64>, mode: FrictionMode) -> Self {
-        let free = (f64::NEG_INFINITY, f64::INFINITY);
+    /// No bounds.
+    pub const NONE: Self = Self {
+        lower: f64::NEG_INFINITY,
+        upper: f64::INFINITY,
+    };
+
+    /// The bounds of a mode that begins at `x`.
+    pub fn of(
+        model: &Model<f64>,
+        injection: Injection<f64>,
+        mode: FrictionMode,
+        x: &Vector4<f64>,
+    ) -> Self {
+        let free = (Self::NONE.lower, Self::NONE.upper);
         let (lower, upper) = match (mode, model.friction_sign(injection)) {
             (FrictionMode::Sticking, _) => {
-                let limit_nm = model.friction_limit_nm();
-                (-limit_nm, limit_nm)
+                let held_nm = held_torque_nm(model, injection, x);
+                (-held_nm, held_nm)
             }
             (FrictionMode::Positive, Sign::Stepped { upper, .. }) => (upper, free.1),
             (FrictionMode::Negative, Sign::Stepped { lower, .. }) => (free.0, lower),
@@ -33,8 +49,37 @@ impl Guard {
             }
             _ => free,
         };
-        Self { mode, lower, upper }
+        Self { lower, upper }
     }
+
+    /// The mode lasts for ever.
+    pub fn never_ends(&self) -> bool {
+        *self == Self::NONE
+    }
+}
+
+/// The driving torque up to which a steering at rest sticks, N m: the friction limit, and a margin that rounding cannot pass. Without it
+/// a friction weaker than the rounding of the torque would change its mode for ever as the steering comes to rest.
+fn held_torque_nm(model: &Model<f64>, injection: Injection<f64>, x: &Vector4<f64>) -> f64 {
+    let limit_nm = model.friction_limit_nm();
+    let constants = model.constants();
+    let slip_angle_size = x[SIDESLIP].abs()
+        + constants.front_lever_s.abs() * x[YAW_RATE].abs()
+        + x[STEERING_ANGLE].abs();
+    let force_size = match model.tires().0 {
+        Tire::Cubic(tire) => {
+            let tire = tire.averaged(injection);
+            let square = slip_angle_size * slip_angle_size;
+            slip_angle_size * (tire.linear_n_per_rad.abs() + tire.cubic_n_per_rad3.abs() * square)
+        }
+        Tire::MagicFormula(tire, _) => {
+            let slope = tire.stiffness_per_rad * tire.shape * (1.0 + tire.curvature.abs());
+            tire.peak_n.abs() * (slope * slip_angle_size).abs()
+        }
+    };
+    let torque_size_nm = constants.motor_torque_nm.abs() + constants.trail_m * force_size;
+    let rounding_nm = ROUNDING_ULPS * f64::EPSILON * torque_size_nm;
+    (limit_nm * (1.0 + RELEASE_MARGIN)).max(limit_nm + rounding_nm)
 }
 
 /// The mode that follows `from`, which ends at `x`; puts the friction law's argument exactly on the step that it passes.
@@ -55,10 +100,13 @@ pub fn next_mode(
     match model.friction_sign(injection).crossing(from, x[argument]) {
         Some((threshold, behind)) => {
             x[argument] = threshold;
-            if model.can_stick(injection) {
-                model.mode_at_rest(x, injection)
-            } else {
-                behind
+            let torque_nm = model.driving_torque_nm(x, injection);
+            match model.can_stick(injection) {
+                true if torque_nm.abs() <= held_torque_nm(model, injection, x) => {
+                    FrictionMode::Sticking
+                }
+                true => model.mode_at_rest(x, injection),
+                false => behind,
             }
         }
         None => from,

@@ -7,10 +7,12 @@
 //! compared against it.
 
 use crate::engine::dual::Dual;
-use crate::engine::events::next_mode;
+use crate::engine::events::{Guard, next_mode};
+use crate::interrupt;
+use crate::motion::{EarlyEnd, Reason, is_bounded};
 use nalgebra::Vector4;
 use shared_model::dither::{Application, Injection};
-use shared_model::friction::{FrictionMode, Sign};
+use shared_model::friction::FrictionMode;
 use shared_model::vehicle::{Model, State};
 use shared_model::{InvalidScenario, Scenario};
 
@@ -24,6 +26,28 @@ const SHORTEST_STEP_S: f64 = 1e-7;
 pub const EVENT_TOLERANCE_S: f64 = 1e-12;
 /// Most trial instants for one event; bisection alone would need 34.
 const MOST_TRIALS: usize = 60;
+/// Steps, events included, that a run may take: at once, and per second of motion. The motions of the paper take some 150 per second.
+const STEPS_AT_ONCE: f64 = 1e4;
+const STEPS_PER_S: f64 = 1e5;
+/// Tolerance of the solution that decides whether a motion diverges.
+pub const DECISIVE_TOLERANCE: f64 = 1e-8;
+/// By this much later it may diverge than the numerical solution, s.
+pub const DECISIVE_MARGIN_S: f64 = 1.0;
+
+/// Why a numerical solution of a motion left all bounds within `time_s` from `start`: the motion itself does, or it stays bounded
+/// when it is integrated to a tolerance.
+pub fn why_unbounded(
+    model: &Model<f64>,
+    injection: Injection<f64>,
+    start: &State<f64>,
+    time_s: f64,
+) -> Reason {
+    let mut reference = Reference::from_state(model, injection, start, DECISIVE_TOLERANCE);
+    match reference.run(time_s + DECISIVE_MARGIN_S) {
+        Err(end) if end.reason == Reason::Diverges => Reason::Diverges,
+        _ => Reason::StepTooLong,
+    }
+}
 
 /// A change of friction mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,7 +69,9 @@ pub struct Reference {
     tolerance: f64,
     step_s: f64,
     time_s: f64,
+    steps: usize,
     state: State<f64>,
+    guard: Guard,
     events: Vec<Event>,
 }
 
@@ -60,18 +86,43 @@ impl Reference {
         averaged.dither.application = Application::Averaged;
         let model = Model::new(&averaged);
         let injection = averaged.dither.injection(0.0);
-        let mut state = model.initial_state(&averaged);
-        state.friction = model.mode_at(&state.x, injection);
-        Ok(Self {
-            tangent_model: Model::new(&averaged.map(&Dual::constant)),
+        let start = model.initial_state(&averaged);
+        Ok(Self::from_state(&model, injection, &start, tolerance))
+    }
+
+    /// The motion of a model from a state; each smooth step is accurate to `tolerance` in every component.
+    pub fn from_state(
+        model: &Model<f64>,
+        injection: Injection<f64>,
+        start: &State<f64>,
+        tolerance: f64,
+    ) -> Self {
+        let friction = model.mode_at(&start.x, injection);
+        Self {
+            model: *model,
+            tangent_model: model.map(&Dual::constant),
             injection,
             tolerance,
             step_s: LONGEST_STEP_S,
             time_s: 0.0,
+            steps: 0,
+            state: State { friction, ..*start },
+            guard: Guard::of(model, injection, friction, &start.x),
             events: Vec::new(),
-            state,
-            model,
-        })
+        }
+    }
+
+    /// Continues under another effect of the dither.
+    pub fn set_injection(&mut self, injection: Injection<f64>) {
+        if injection != self.injection {
+            self.injection = injection;
+            self.set_mode(self.model.mode_at(&self.state.x, injection));
+        }
+    }
+
+    fn set_mode(&mut self, mode: FrictionMode) {
+        self.state.friction = mode;
+        self.guard = Guard::of(&self.model, self.injection, mode, &self.state.x);
     }
 
     /// The present state.
@@ -84,15 +135,41 @@ impl Reference {
         &self.events
     }
 
-    /// Goes on for `span_s` seconds.
-    pub fn run(&mut self, span_s: f64) -> &State<f64> {
+    /// Continues for `span_s` seconds.
+    ///
+    /// # Errors
+    /// If the motion diverges, or takes more steps or mode transitions than a motion of that length may. The present state is then the
+    /// last one.
+    pub fn run(&mut self, span_s: f64) -> Result<&State<f64>, EarlyEnd> {
         let end_s = self.time_s + span_s;
         // What rounding of the sum leaves is no step.
         while end_s - self.time_s > EVENT_TOLERANCE_S {
+            interrupt::check();
             self.step(end_s - self.time_s);
+            self.check_step()?;
         }
         self.time_s = end_s;
-        &self.state
+        Ok(&self.state)
+    }
+
+    fn check_step(&mut self) -> Result<(), EarlyEnd> {
+        self.steps += 1;
+        let early = |reason| EarlyEnd {
+            time_s: self.time_s,
+            reason,
+        };
+        if !is_bounded(&self.state.x) {
+            return Err(early(Reason::Diverges));
+        }
+        if self.steps as f64 <= STEPS_AT_ONCE + STEPS_PER_S * self.time_s {
+            return Ok(());
+        }
+        let chatters = 2 * self.events.len() > self.steps;
+        Err(early(if chatters {
+            Reason::Chattering
+        } else {
+            Reason::TooManySteps
+        }))
     }
 
     /// One smooth step of at most `most_s`, or less if an event ends it.
@@ -156,38 +233,30 @@ impl Reference {
             .derivative(x, self.injection, self.state.friction)
     }
 
-    /// Where the present mode ends: positive inside it. Infinite for a mode that never ends.
-    fn margin<T: shared_model::Real>(
-        model: &Model<T>,
-        x: &Vector4<T>,
-        injection: Injection<T>,
-        mode: FrictionMode,
-    ) -> T {
-        let argument = x[model.friction_argument()];
-        let least = |a: T, b: T| if a < b { a } else { b };
-        match (mode, model.friction_sign(injection)) {
-            (FrictionMode::Sticking, _) => {
-                model.friction_limit_nm() - model.driving_torque_nm(x, injection).abs()
-            }
-            (FrictionMode::Positive, Sign::Stepped { upper, .. }) => argument - upper,
-            (FrictionMode::Negative, Sign::Stepped { lower, .. }) => lower - argument,
-            (FrictionMode::Neutral, Sign::Stepped { lower, upper }) if lower < upper => {
-                least(argument - lower, upper - argument)
-            }
-            _ => T::from_f64(f64::INFINITY),
-        }
-    }
-
-    /// The margin at a state, and its rate of change along the motion.
+    /// How far a state is within the bounds of the present mode, and the rate at which that changes along the motion. Infinite for a
+    /// mode that never ends.
     fn margin_and_rate(&self, x: &Vector4<f64>) -> (f64, f64) {
         let along = x.zip_map(&self.slope(x), |value, slope| Dual::new(value, [slope]));
-        let injection = self.injection.map(Dual::constant);
-        let margin = Self::margin(&self.tangent_model, &along, injection, self.state.friction);
-        (margin.value, margin.tangent[0])
+        let guarded: Dual<1> = match self.state.friction {
+            FrictionMode::Sticking => self
+                .tangent_model
+                .driving_torque_nm(&along, self.injection.map(Dual::constant)),
+            _ => along[self.model.friction_argument()],
+        };
+        let (value, rate) = (guarded.value, guarded.tangent[0]);
+        let (above, below) = (value - self.guard.lower, self.guard.upper - value);
+        if above < below {
+            (above, rate)
+        } else {
+            (below, -rate)
+        }
     }
 
     /// The first instant of a step, from its start, at which the present mode ends.
     fn first_event(&self, step_s: f64, end: &Vector4<f64>) -> Option<f64> {
+        if self.guard.never_ends() {
+            return None;
+        }
         let (margin, rate) = self.margin_and_rate(end);
         if margin < 0.0 {
             return Some(self.root(step_s, |x| self.margin_and_rate(x).0));
@@ -234,7 +303,8 @@ impl Reference {
         let from = self.state.friction;
         let to = next_mode(&self.model, self.injection, from, &mut x);
         self.time_s += instant_s;
-        self.state = State { x, friction: to };
+        self.state.x = x;
+        self.set_mode(to);
         self.step_s = LONGEST_STEP_S;
         let time_s = self.time_s;
         self.events.push(Event { time_s, from, to });

@@ -6,12 +6,14 @@ mod watch;
 
 use super::equation::Equation;
 use super::expansion::Expansion;
-use super::guard::{Guards, RELEASE_MARGIN};
+use super::guard::Guards;
 use super::lanes::Lanes;
 use super::motion::{Found, Span};
 use super::queue::{LONGEST_STEP_S, Motion, Numbers, Queue};
 use super::series::{ORDER, Series, value};
 use crate::engine::events::{Guard, next_mode};
+use crate::interrupt;
+use crate::motion::{EarlyEnd, Reason};
 use nalgebra::Vector4;
 use pulp::Simd;
 use shared_model::friction::FrictionMode;
@@ -25,8 +27,13 @@ const USUAL_SHRINKS: usize = 3;
 const MOST_SHRINKS: usize = 300;
 /// A mode shorter than this, s, is one of a row in which a motion slides along a step of its friction law.
 const SHORT_MODE_S: f64 = 1e-6;
-/// After so many steps another of the last motions waits for its turn.
+/// Steps after which the last motions take turns, interruptions are heard, and the number of steps is held against its bound.
 const STEPS_A_TURN: usize = 64;
+/// Steps that a motion may take: at once, and per second of motion. The paper's take some ten per second.
+const STEPS_AT_ONCE: f64 = 1e5;
+const STEPS_PER_S: f64 = 1e5;
+/// Mode transitions in a row after short modes that indicate a sliding mode.
+const MOST_SHORT_MODES: usize = 1000;
 
 /// What was found of the task with an index.
 pub(super) type Result<const K: usize> = (usize, Found<K>);
@@ -95,6 +102,8 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         while self.aboard > 0 {
             self.step();
             if self.steps.is_multiple_of(STEPS_A_TURN) {
+                interrupt::check();
+                self.bound_steps();
                 self.take_turns();
             }
         }
@@ -134,6 +143,30 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         }
         self.keep_tangents_finite();
         self.end_what_has_ended();
+    }
+
+    /// Ends motions that take more steps than a motion of their time may: with the tolerance's bound on a step, no input makes a run
+    /// endless.
+    #[inline(never)]
+    fn bound_steps(&mut self) {
+        for lane in 0..self.lanes.len() {
+            let Some(motion) = &self.lanes[lane] else {
+                continue;
+            };
+            let steps = motion.found.steps + self.steps - motion.boarded;
+            if steps as f64 > STEPS_AT_ONCE + STEPS_PER_S * self.time_s(lane) {
+                self.end_early(lane, Reason::TooManySteps);
+            }
+        }
+    }
+
+    /// Ends a lane's motion where it is, at the end of this step or of the next.
+    fn end_early(&mut self, lane: usize, reason: Reason) {
+        let time_s = self.time_s(lane);
+        if let Some(motion) = &mut self.lanes[lane] {
+            motion.found.early_end = Some(EarlyEnd { time_s, reason });
+            self.left_s.as_mut_slice()[lane] = 0.0;
+        }
     }
 
     /// The step of each lane: no longer than its last term is within the tolerance, nor than its piece.
@@ -193,7 +226,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         let from = motion.mode;
         if from != FrictionMode::Sticking {
             // Just beyond, whatever rounding left.
-            let is_lower = bound == Guard::of(model, injection, from).lower;
+            let is_lower = bound == Guard::of(model, injection, from, &x).lower;
             let beyond = if is_lower {
                 bound.next_down()
             } else {
@@ -201,12 +234,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             };
             x[argument] = beyond;
         }
-        let mut to = next_mode(model, injection, from, &mut x);
-        let torque_nm = model.driving_torque_nm(&x, injection).abs();
-        let held_nm = model.friction_limit_nm() * (1.0 + RELEASE_MARGIN);
-        if from != FrictionMode::Sticking && model.can_stick(injection) && torque_nm <= held_nm {
-            to = FrictionMode::Sticking;
-        }
+        let to = next_mode(model, injection, from, &mut x);
         let before = model.derivative(&x, injection, from);
         let after = model.derivative(&x, injection, to);
         motion.mode = to;
@@ -216,6 +244,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         } else {
             0
         };
+        let chatters = motion.short_modes > MOST_SHORT_MODES;
         for i in 0..4 {
             motion.found.extend(i, x[i]);
         }
@@ -235,6 +264,9 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             self.expansion.x[i][0].as_mut_slice()[lane] = x[i];
         }
         self.load_mode(lane);
+        if chatters {
+            self.end_early(lane, Reason::Chattering);
+        }
     }
 
     /// Puts the numbers of a lane's mode into the vectors.
@@ -243,8 +275,10 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             return;
         };
         let (model, injection) = (&motion.task.model, motion.task.injection);
+        let x = Vector4::from(self.state(lane));
         self.expansion.set_mode(lane, model, motion.mode);
-        self.guards.set_lane(lane, model, injection, motion.mode);
+        self.guards
+            .set_lane(lane, model, injection, motion.mode, &x);
     }
 
     fn state(&self, lane: usize) -> [f64; 4] {

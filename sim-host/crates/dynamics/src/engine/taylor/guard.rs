@@ -4,6 +4,7 @@ use super::lanes::Lanes;
 use super::roots::{self, Polynomial};
 use super::series::{ORDER, Series, of_lane};
 use crate::engine::events::Guard;
+use nalgebra::Vector4;
 use pulp::Simd;
 use shared_model::dither::Injection;
 use shared_model::friction::FrictionMode;
@@ -11,9 +12,6 @@ use shared_model::vehicle::Model;
 
 /// Least time between two changes of mode, s: an end sooner than that is rounding of the torque at its limit.
 const SHORTEST_MODE_S: f64 = 1e-9;
-/// Share of the friction limit by which the torque must exceed it before the steering leaves rest. At rest right at the limit
-/// rounding would otherwise release it and stop it for ever.
-pub(super) const RELEASE_MARGIN: f64 = 1e-10;
 
 /// [`Guard`]s in lanes, of the quantity `argument + per_force * F_f`.
 pub(super) struct Guards<L> {
@@ -48,21 +46,18 @@ impl<S: Simd, const V: usize> Guards<Lanes<S, V>> {
         model: &Model<f64>,
         injection: Injection<f64>,
         mode: FrictionMode,
+        x: &Vector4<f64>,
     ) {
-        let guard = Guard::of(model, injection, mode);
+        let guard = Guard::of(model, injection, mode, x);
         let constants = model.constants();
         // While sticking the guard is the driving torque, whose constant goes over to the bounds.
-        let (per_force, shift, wider) = match mode {
-            FrictionMode::Sticking => (
-                -constants.trail_m,
-                constants.motor_torque_nm,
-                1.0 + RELEASE_MARGIN,
-            ),
-            _ => (0.0, 0.0, 1.0),
+        let (per_force, shift) = match mode {
+            FrictionMode::Sticking => (-constants.trail_m, constants.motor_torque_nm),
+            _ => (0.0, 0.0),
         };
         self.per_force.as_mut_slice()[lane] = per_force;
-        self.lower.as_mut_slice()[lane] = guard.lower * wider - shift;
-        self.upper.as_mut_slice()[lane] = guard.upper * wider - shift;
+        self.lower.as_mut_slice()[lane] = guard.lower - shift;
+        self.upper.as_mut_slice()[lane] = guard.upper - shift;
     }
 
     /// Positive in lanes that certainly stay within their bounds for the whole step, given the series of argument and force.

@@ -4,7 +4,7 @@ use super::equation::{Analytic, Equation, Polynomial};
 use super::flight;
 use super::queue::Queue;
 use super::tires::offsets;
-use crate::motion::Diverged;
+use crate::motion::EarlyEnd;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use shared_model::dither::{Application, Injection};
@@ -69,8 +69,8 @@ pub type Growths<const K: usize> = [f64; K];
 pub struct Found<const K: usize> {
     /// The state at the end.
     pub end: State<f64>,
-    /// When it left all bounds, s from the start; or when its friction modes became too short to tell.
-    pub diverged: Option<Diverged>,
+    /// When and why it ended before its time, from the start; the rest is up to there.
+    pub early_end: Option<EarlyEnd>,
     /// Turning points of each component watched: time from the start (s) and value.
     pub turns: [Vec<(f64, f64)>; 4],
     /// Crossings of the section.
@@ -94,7 +94,7 @@ impl<const K: usize> Found<K> {
     pub fn at(start: &State<f64>) -> Self {
         Self {
             end: *start,
-            diverged: None,
+            early_end: None,
             turns: [const { Vec::new() }; 4],
             crossings: Vec::new(),
             lower: start.x.into(),
@@ -348,7 +348,7 @@ mod tests {
             motion.follow::<4>(&span()).remove(0)
         };
         assert_eq!(scenarios.iter().map(alone).collect::<Vec<_>>(), portable);
-        assert!(portable[7].diverged.is_some());
+        assert!(portable[7].early_end.is_some());
         assert!(portable.iter().any(|found| found.events > 0));
         assert!(portable.iter().all(|found| found.crossings.len() < 1000));
     }

@@ -5,14 +5,9 @@ use crate::engine::taylor::equation::Equation;
 use crate::engine::taylor::lanes::Lanes;
 use crate::engine::taylor::queue::{Numbers, Waiting};
 use crate::engine::taylor::series::Series;
-use crate::motion::{BOUND, Diverged};
+use crate::motion::{BOUND, Reason};
 use pulp::Simd;
 use shared_model::vehicle::State;
-
-/// A motion that needs a step shorter than this leaves all bounds, s.
-const SHORTEST_STEP_S: f64 = 1e-9;
-/// So many short modes in a row are one too many.
-const MOST_SHORT_MODES: usize = 1000;
 
 impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, K, E> {
     /// The last motions take turns in the lanes: the one furthest ahead waits for the one furthest behind, so that all end together and
@@ -50,19 +45,17 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
 
     #[inline(never)]
     fn end_of_lane(&mut self, lane: usize) {
-        let x = self.state(lane);
-        let step_s = self.step_s.as_slice()[lane];
-        let left_s = self.left_s.as_slice()[lane];
-        let time_s = self.time_s(lane);
-        let Some(motion) = &mut self.lanes[lane] else {
+        let Some(motion) = &self.lanes[lane] else {
             return;
         };
-        let bounded = x.iter().all(|value| value.abs() < BOUND);
-        let slides = motion.short_modes > MOST_SHORT_MODES;
-        if !bounded || step_s < SHORTEST_STEP_S || slides {
-            motion.found.diverged = Some(Diverged { time_s });
+        let ended_early = motion.found.early_end.is_some();
+        let bounded = self.state(lane).iter().all(|value| value.abs() < BOUND);
+        if !ended_early && !bounded {
+            self.end_early(lane, Reason::Diverges);
+        }
+        if ended_early || !bounded {
             self.unload(lane);
-        } else if left_s <= 0.0 {
+        } else if self.left_s.as_slice()[lane] <= 0.0 {
             self.end_piece(lane);
         }
     }
