@@ -2,13 +2,14 @@
 
 use super::equation::{Analytic, Equation, Polynomial};
 use super::flight;
-use super::queue::Queue;
+use super::queue::{Queue, longest_step_s};
 use super::tires::offsets;
 use crate::motion::EarlyEnd;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use shared_model::dither::{Application, Injection};
 use shared_model::friction::Sign;
+use shared_model::stability::fastest_rate_per_s;
 use shared_model::vehicle::{Model, SlipForm, State};
 use shared_model::{InvalidScenario, Scenario};
 use std::marker::PhantomData;
@@ -129,6 +130,7 @@ pub(super) struct Task {
     pub model: Model<f64>,
     pub injection: Injection<f64>,
     pub start: State<f64>,
+    pub longest_step_s: f64,
 }
 
 impl Task {
@@ -148,6 +150,7 @@ impl Task {
             model,
             injection,
             start,
+            longest_step_s: longest_step_s(fastest_rate_per_s(&averaged)),
         })
     }
 
@@ -299,6 +302,13 @@ mod tests {
                 scenario.vehicle.slip_form = SlipForm::Exact;
                 scenario.tires.model = TireModel::MagicFormula;
                 scenario.run.wheel_speed_rpm = 1700.0;
+            }
+            if k == 11 || k == 13 {
+                // At rest from the start, at exact zeros; with a friction of no torque.
+                scenario.run.sideslip_rad = 0.0;
+                scenario.run.steering_angle_rad = 0.0;
+                scenario.steering.motor_current_a = 0.0;
+                scenario.friction.coefficient = if k == 11 { 0.0 } else { 0.28 };
             }
             if k == 7 {
                 (scenario.tires.front, scenario.tires.rear) =
