@@ -11,6 +11,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::SystemHandler;
 use shared_model::ecu::Ecu;
 use shared_model::open_loop::OpenLoop;
+use shared_model::stability::MOST_STEP_TIMES_RATE;
 use shared_model::{InvalidScenario, Scenario};
 
 /// The watchdog bites when no model step arrives for this many of its periods, or for this long, ms, if that is longer.
@@ -133,6 +134,17 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             dither_v,
             motor_v,
             bus_v
+        ),
+        InvalidScenario::StepTooLong {
+            field,
+            rate_hz,
+            fastest_rate_per_s,
+        } => defmt::error!(
+            "scenario refused: {=str} = {=f64}: the step is too long for the model's fastest rate, {=f64} 1/s: at least {=f64} Hz",
+            field,
+            rate_hz,
+            fastest_rate_per_s,
+            fastest_rate_per_s / MOST_STEP_TIMES_RATE
         ),
     }
     ExitCode::BadScenario

@@ -42,6 +42,11 @@ impl Edge {
     pub fn middle(&self) -> f64 {
         0.5 * (self.lower + self.upper)
     }
+
+    /// There is a number between its ends.
+    fn can_be_halved(&self) -> bool {
+        self.lower < self.middle() && self.middle() < self.upper
+    }
 }
 
 /// A stretch of the parameter with one kind of motion at all values looked at.
@@ -99,7 +104,7 @@ pub fn regions(
         samples.sort_by(|a, b| a.value.total_cmp(&b.value));
         let wide = edges(&samples)
             .into_iter()
-            .filter(|edge| edge.upper - edge.lower > width);
+            .filter(|edge| edge.upper - edge.lower > width && edge.can_be_halved());
         level = wide
             .map(|edge| parameter.set(scenario, edge.middle()))
             .collect();

@@ -279,9 +279,18 @@ impl Watch<'_> {
         if self.stop.load(Ordering::Relaxed) {
             return None;
         }
-        let result = interrupt::catch(work).ok()?;
+        let result = self.unless_interrupted(work)?;
         (self.done)();
         Some(result)
+    }
+
+    /// The result of `work`, none if it was interrupted. Where nobody watches, the interruption is the caller's.
+    fn unless_interrupted<R>(&self, work: impl FnOnce() -> R) -> Option<R> {
+        let result = interrupt::catch(work);
+        if result.is_err() && !self.stop.load(Ordering::Relaxed) {
+            interrupt::check();
+        }
+        result.ok()
     }
 
     /// Independent work on many items at once. Results are in the items' order whatever the number of threads; items that
@@ -306,7 +315,7 @@ impl Watch<'_> {
             if self.stop.load(Ordering::Relaxed) {
                 return batch.iter().map(|_| None).collect();
             }
-            let Ok(results) = interrupt::catch(|| work(batch)) else {
+            let Some(results) = self.unless_interrupted(|| work(batch)) else {
                 return batch.iter().map(|_| None).collect();
             };
             results.iter().for_each(|_| (self.done)());

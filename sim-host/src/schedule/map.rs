@@ -189,5 +189,8 @@ fn middle_v(lower: &Cell, upper: &Cell, width_v: f64) -> Option<f64> {
     let wide = upper.amplitude_v - lower.amplitude_v > width_v;
     let (below, above) = (lower.class(), upper.class());
     let edge = below != above && (below.is_calm() || above.is_calm());
-    (same_column && wide && edge).then_some(0.5 * (lower.amplitude_v + upper.amplitude_v))
+    let middle_v = 0.5 * (lower.amplitude_v + upper.amplitude_v);
+    // Neighbouring numbers have none between them.
+    let between = lower.amplitude_v < middle_v && middle_v < upper.amplitude_v;
+    (same_column && wide && edge && between).then_some(middle_v)
 }
