@@ -107,6 +107,90 @@ fn options_are_checked() {
     );
 }
 
+/// What a step cannot follow is refused when the scenario is accepted, or named when the run shows it; never as a motion that diverges.
+#[test]
+fn a_step_that_is_too_long_is_no_divergence() {
+    assert_config_refused(
+        "[steering]\ninertia_kg_m2 = 0.05",
+        &[
+            "run.control_rate_hz = 1000: the step is too long",
+            "at most 2.6",
+            "at least 1544 Hz",
+        ],
+    );
+    let folder = folder();
+    let write = |name: &str, toml: &str| fs::write(folder.path().join(name), toml).expect("a file");
+    write("far.toml", "[run]\nsideslip_rad = 8.0");
+    let simulate = ["simulate", "--config", "far.toml", "--out", "t.csv"];
+    assert_refused(
+        folder.path(),
+        simulate,
+        &["the step is too long", "Raise run.control_rate_hz"],
+    );
+    let lyapunov = [
+        "lyapunov", "--config", "far.toml", "--method", "all", "--time", "250",
+    ];
+    let output = assert_ends(&mut command(folder.path(), lyapunov), 0);
+    let table = String::from_utf8_lossy(&output.stdout);
+    assert!(table.contains("untested: the step is too long"), "{table}");
+    assert!(!table.contains("diverges"), "{table}");
+    assert_refused(
+        folder.path(),
+        ["simulate", "--rpm", "1", "--out", "t.csv"],
+        &["the step is too long"],
+    );
+}
+
+/// Friction of no torque: the steering comes to rest smoothly, and all methods and analyses agree on it.
+#[test]
+fn a_smooth_rest_without_friction_is_an_equilibrium() {
+    let folder = folder();
+    fs::write(
+        folder.path().join("mu0.toml"),
+        "[friction]\ncoefficient = 0.0",
+    )
+    .expect("a file");
+    let run = |arguments: &str| {
+        let arguments = arguments.split_whitespace().chain(["--config", "mu0.toml"]);
+        let output = assert_ends(&mut command(folder.path(), arguments), 0);
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let table =
+        run("lyapunov --rpm 1750 --dither square --amplitude-v 0.14 --method all --time 500");
+    let rates = table.lines().filter(|line| line.contains("1750"));
+    let rates: Vec<f64> = rates
+        .map(|line| {
+            line.split_whitespace()
+                .nth(3)
+                .expect(line)
+                .parse()
+                .expect(line)
+        })
+        .collect();
+    assert_eq!(rates.len(), 3, "{table}");
+    assert!(
+        rates.iter().all(|rate| (rate + 0.22).abs() < 0.01),
+        "{table}"
+    );
+    run(
+        "map --dither square --from 1740 --to 1750 --speeds 2 --square-to 0.14 --amplitudes 2 --out map.csv",
+    );
+    let map = fs::read_to_string(folder.path().join("map.csv")).expect("the map");
+    let rests: Vec<_> = map.lines().filter(|row| row.contains(",0.14,")).collect();
+    assert_eq!(rests.len(), 2, "{map}");
+    assert!(
+        rests.iter().all(|row| row.contains(",equilibrium,0,,-0.2")),
+        "{map}"
+    );
+    let regions = run(
+        "regions --rpm 1750 --dither square --over amplitude --from 0.14 --to 0.15 --step 0.005",
+    );
+    assert!(
+        regions.contains("equilibrium") && !regions.contains("diverges"),
+        "{regions}"
+    );
+}
+
 #[test]
 fn a_diverging_motion_is_said_and_not_written() {
     let folder = folder();

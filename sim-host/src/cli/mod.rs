@@ -221,7 +221,9 @@ fn say_differences(scenario: &Scenario<f64>) {
 /// What to do about a motion that ends early.
 fn advice(reason: Reason) -> &'static str {
     match reason {
-        Reason::Diverges => "Set B of Table 1 with the cubic tyre and a negative peak_n diverge",
+        Reason::Diverges => {
+            "Set B of Table 1 with the cubic tyre diverges, and so does a negative peak_n"
+        }
         _ => "Raise run.control_rate_hz, and run.pwm_rate_hz with it",
     }
 }

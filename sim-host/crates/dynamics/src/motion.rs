@@ -16,14 +16,31 @@ pub fn is_bounded<T: Real>(x: &Vector4<T>) -> bool {
 }
 
 /// A trajectory that ended before its time.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error, serde::Serialize)]
-#[error("{reason} at {time_s} s")]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct EarlyEnd {
     /// When, s.
     pub time_s: f64,
     /// Why.
     pub reason: Reason,
 }
+
+impl std::fmt::Display for EarlyEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { time_s, reason } = self;
+        match reason {
+            Reason::Diverges => write!(f, "the motion diverges at {time_s:.3} s"),
+            Reason::StepTooLong => write!(
+                f,
+                "the step is too long: at {time_s:.3} s the fixed step leaves all bounds, within which the motion itself stays"
+            ),
+            Reason::Chattering | Reason::TooManySteps => {
+                write!(f, "the integrator stops at {time_s:.3} s: {reason}")
+            }
+        }
+    }
+}
+
+impl std::error::Error for EarlyEnd {}
 
 impl EarlyEnd {
     /// The same, counted from an instant `earlier_s` before.
@@ -40,18 +57,16 @@ impl EarlyEnd {
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
     /// The solution itself leaves all physical bounds: angles in rad and rates in rad/s below a thousand.
-    #[error("the motion diverges")]
+    #[error("diverges")]
     Diverges,
     /// The numerical solution left the bounds, while the solution to a tolerance stays within them: the fixed step is unstable.
-    #[error(
-        "the step is too long: the fixed step is unstable, and the motion itself stays bounded,"
-    )]
+    #[error("step too long")]
     StepTooLong,
     /// Mode transitions of the friction follow each other without end: a sliding mode, which an integrator between events cannot pass.
-    #[error("the friction chatters between its modes")]
+    #[error("chattering friction")]
     Chattering,
     /// The tolerance asks for more steps per second of motion than a run may take.
-    #[error("the equations are too stiff for this integrator")]
+    #[error("too many steps")]
     TooManySteps,
 }
 
