@@ -128,7 +128,7 @@ fn a_step_that_is_too_long_is_no_divergence() {
         &["the step is too long", "Raise run.control_rate_hz"],
     );
     let lyapunov = [
-        "lyapunov", "--config", "far.toml", "--method", "all", "--time", "250",
+        "lyapunov", "--config", "far.toml", "--method", "all", "--time", "350",
     ];
     let output = assert_ends(&mut command(folder.path(), lyapunov), 0);
     let table = String::from_utf8_lossy(&output.stdout);

@@ -27,6 +27,8 @@ const USUAL_SHRINKS: usize = 3;
 const MOST_SHRINKS: usize = 300;
 /// A mode shorter than this, s, is one of a row in which a motion slides along a step of its friction law.
 const SHORT_MODE_S: f64 = 1e-6;
+/// Largest last term of a tangent vector's expansion, as a share of its length.
+const TANGENT_TOLERANCE: f64 = 1e-7;
 /// Steps after which the last motions take turns, interruptions are heard, and the number of steps is held against its bound.
 const STEPS_A_TURN: usize = 64;
 /// Steps that a motion may take: at once, and per second of motion. The paper's take some ten per second.
@@ -179,7 +181,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         let splat = |number| Lanes::splat(simd, number);
         let factor = SHRINK.powi(ORDER as i32);
         let tolerance = splat(self.span.tolerance);
-        let last = greatest(&self.expansion.x, ORDER);
+        let last = greatest(&self.expansion.x, ORDER).max(self.last_of_tangents());
         let mut step_s = self.step_s;
         let mut error = last * power(step_s);
         for tried in 0..MOST_SHRINKS {
@@ -193,6 +195,23 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
         let error_of_longer = error.scale(1.0 / factor);
         self.step_s = error_of_longer.select_less(tolerance, longer, step_s);
         step_s.min(self.left_s)
+    }
+
+    /// Greatest last term of the tangent vectors, weighed so that the tolerance of a state is theirs. At rest the state's own terms
+    /// vanish, and would allow any step.
+    #[inline(always)]
+    fn last_of_tangents(&self) -> Lanes<S, V> {
+        let zero = self.step_s.zero();
+        let mut last = zero;
+        for k in 0..K {
+            last = last.max(greatest(&self.expansion.tangents[k], ORDER));
+        }
+        if K == 1 {
+            // A single vector has any length, and none where friction took it away.
+            let length = greatest(&self.expansion.tangents[0], 0);
+            last = zero.select_less(length, last.over(length), zero);
+        }
+        last.scale(self.span.tolerance / TANGENT_TOLERANCE)
     }
 
     /// Shortens the step of lanes whose friction mode ends within it.
