@@ -37,7 +37,7 @@ fn ranges_are_checked() {
             &["waveform is none", "square or sine"],
         );
         assert_refused(
-            &line("--over amplitude --dither square --from 5 --to 20 --step 1"),
+            &line("--over amplitude --dither sine --from 5 --to 20 --step 1"),
             &["bus_voltage"],
         );
         assert_refused(
