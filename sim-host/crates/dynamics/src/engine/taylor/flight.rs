@@ -9,7 +9,7 @@ use super::expansion::Expansion;
 use super::guard::Guards;
 use super::lanes::Lanes;
 use super::motion::{Found, Span};
-use super::queue::{Motion, Numbers, Queue};
+use super::queue::{LONGEST_STEP_S, Motion, Numbers, Queue};
 use super::series::{ORDER, Series, value};
 use crate::engine::events::{Guard, next_mode};
 use crate::interrupt;
@@ -58,8 +58,6 @@ pub(super) struct Flight<'a, S: Simd, const V: usize, const K: usize, E: Equatio
     guards: Guards<Lanes<S, V>>,
     /// The step that the tolerance allows, s.
     step_s: Lanes<S, V>,
-    /// The longest step that the model allows, s.
-    longest_step_s: Lanes<S, V>,
     /// What is left of the piece, s; infinite in an empty lane.
     left_s: Lanes<S, V>,
     /// Lanes whose friction mode ends in the present step, each with the bound that ends it.
@@ -86,7 +84,6 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             expansion: Expansion::new(simd, &like.model, like.injection),
             guards: Guards::none(simd),
             step_s: splat(0.0),
-            longest_step_s: splat(0.0),
             left_s: splat(f64::INFINITY),
             ends_of_modes: Vec::new(),
             stretch: [splat(1.0); K],
@@ -191,7 +188,7 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             step_s = error.select_less(tolerance, step_s, step_s.scale(SHRINK));
             error = error.select_less(tolerance, error, error.scale(factor));
         }
-        let longer = step_s.scale(1.0 / SHRINK).min(self.longest_step_s);
+        let longer = step_s.scale(1.0 / SHRINK).min(splat(LONGEST_STEP_S));
         let error_of_longer = error.scale(1.0 / factor);
         self.step_s = error_of_longer.select_less(tolerance, longer, step_s);
         step_s.min(self.left_s)

@@ -2,14 +2,13 @@
 
 use super::equation::{Analytic, Equation, Polynomial};
 use super::flight;
-use super::queue::{Queue, longest_step_s};
+use super::queue::Queue;
 use super::tires::offsets;
 use crate::motion::EarlyEnd;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use shared_model::dither::{Application, Injection};
 use shared_model::friction::Sign;
-use shared_model::stability::fastest_rate_per_s;
 use shared_model::vehicle::{Model, SlipForm, State};
 use shared_model::{InvalidScenario, Scenario};
 use std::marker::PhantomData;
@@ -130,7 +129,6 @@ pub(super) struct Task {
     pub model: Model<f64>,
     pub injection: Injection<f64>,
     pub start: State<f64>,
-    pub longest_step_s: f64,
 }
 
 impl Task {
@@ -150,7 +148,6 @@ impl Task {
             model,
             injection,
             start,
-            longest_step_s: longest_step_s(fastest_rate_per_s(&averaged)),
         })
     }
 

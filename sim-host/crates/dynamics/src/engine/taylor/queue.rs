@@ -6,10 +6,7 @@ use shared_model::vehicle::{STEERING_RATE, State};
 use std::sync::{Mutex, MutexGuard};
 
 /// Longest step, s.
-const LONGEST_STEP_S: f64 = 0.2;
-/// Longest step times the model's fastest rate. At rest the tolerance allows any step, but beyond this the expansion neither follows
-/// the tangent vectors nor keeps rounding from growing.
-const MOST_STEP_TIMES_RATE: f64 = 1.5;
+pub(super) const LONGEST_STEP_S: f64 = 0.2;
 
 /// A motion on its way.
 pub(super) struct Motion<'a, const K: usize> {
@@ -55,20 +52,13 @@ pub(super) struct Numbers<const K: usize> {
     pub stretch: [f64; K],
     /// The step that the tolerance allows, s.
     pub step_s: f64,
-    /// The longest step that the model allows, s.
-    pub longest_step_s: f64,
     /// What is left of the piece, s.
     pub left_s: f64,
 }
 
-/// The longest step of a model with this fastest rate, s.
-pub(super) fn longest_step_s(fastest_rate_per_s: f64) -> f64 {
-    LONGEST_STEP_S.min(MOST_STEP_TIMES_RATE / fastest_rate_per_s)
-}
-
 impl<const K: usize> Numbers<K> {
     /// Those of a motion's start.
-    fn at(start: &State<f64>, longest_step_s: f64, left_s: f64) -> Self {
+    fn at(start: &State<f64>, left_s: f64) -> Self {
         let mut tangents = [[0.5; 4]; K];
         for (k, tangent) in tangents.iter_mut().enumerate() {
             // Linearly independent, and none along an axis, which may be invariant; a steering that sticks has no rate.
@@ -81,8 +71,7 @@ impl<const K: usize> Numbers<K> {
             x: start.x.into(),
             tangents,
             stretch: [1.0; K],
-            step_s: longest_step_s,
-            longest_step_s,
+            step_s: LONGEST_STEP_S,
             left_s,
         }
     }
@@ -93,7 +82,10 @@ impl<const K: usize> Numbers<K> {
             x: [0.0; 4].into(),
             friction: FrictionMode::Neutral,
         };
-        Self::at(&rest, 0.0, f64::INFINITY)
+        Self {
+            step_s: 0.0,
+            ..Self::at(&rest, f64::INFINITY)
+        }
     }
 }
 
@@ -146,7 +138,7 @@ impl<'a, const K: usize> Queue<'a, K> {
             return waiting.furthest_behind();
         };
         waiting.next += 1;
-        let numbers = Numbers::at(&task.start, task.longest_step_s, self.first_s);
+        let numbers = Numbers::at(&task.start, self.first_s);
         Some((Motion::at_start(index, task), numbers))
     }
 

@@ -125,7 +125,6 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             }),
             stretch: self.stretch.map(|stretch| stretch.as_slice()[lane]),
             step_s: self.step_s.as_slice()[lane],
-            longest_step_s: self.longest_step_s.as_slice()[lane],
             left_s: self.left_s.as_slice()[lane],
         };
         self.aboard -= 1;
@@ -146,7 +145,6 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Flight<'a, S, V, 
             self.stretch[k].as_mut_slice()[lane] = numbers.stretch[k];
         }
         self.step_s.as_mut_slice()[lane] = numbers.step_s;
-        self.longest_step_s.as_mut_slice()[lane] = numbers.longest_step_s;
         self.left_s.as_mut_slice()[lane] = numbers.left_s;
     }
 }
