@@ -203,7 +203,7 @@ fn a_firmware_that_dies_or_refuses_is_said() {
     assert!(message.contains("dither.amplitude_v"), "{message}");
 
     // An image that never opens the link.
-    let silent = start("fault-drill", &["hang".into()]).err();
+    let silent = start("fault-drill", &["fault=hang".into()]).err();
     assert!(
         matches!(silent, Some(RunError::TimedOut { .. })),
         "{silent:?}"

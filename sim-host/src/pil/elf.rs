@@ -1,5 +1,6 @@
 //! The firmware's image: is it one for this machine, and how large is it?
 
+use crate::bounded;
 use object::{Architecture, Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
 use std::path::{Path, PathBuf};
 
@@ -63,9 +64,12 @@ impl Image {
     /// If the file cannot be read or is no ELF for 32-bit Arm.
     pub fn open(path: &Path) -> Result<Self, ImageError> {
         let path = path.to_path_buf();
-        let bytes = std::fs::read(&path).map_err(|source| ImageError::Unreadable {
-            path: path.clone(),
-            source,
+        let is_elf = |start: &[u8]| start.starts_with(&elf::ELFMAG);
+        let bytes = bounded::read(&path, bounded::IMAGE_BYTES, is_elf).map_err(|source| {
+            ImageError::Unreadable {
+                path: path.clone(),
+                source,
+            }
         })?;
         let file = object::File::parse(&*bytes).map_err(|error| ImageError::NotElf {
             path: path.clone(),
