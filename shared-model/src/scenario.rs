@@ -15,7 +15,7 @@ use core::fmt;
 /// One step, less what rounding to f32 can take from it.
 const ALMOST_ONE: f64 = 1.0 - 1e-6;
 /// Most PWM samples in a model step; a telemetry record holds them all.
-const MAX_RATIO: u32 = 1000;
+pub(crate) const MAX_RATIO: u32 = 1000;
 /// Most PWM samples of a run; a counter of 32 bits holds them.
 const MAX_SAMPLES: f64 = 4e9;
 

@@ -119,14 +119,7 @@ impl<'a> Folder<'a> {
     }
 
     fn write(&self, tile: usize, cells: &[Cell]) -> anyhow::Result<()> {
-        let plan = self.plan.clone();
-        let header = serde_json::to_string(&Header { tile, plan })?;
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        for cell in cells {
-            csv.serialize(cell)?;
-        }
-        let rows = String::from_utf8(csv.into_inner()?)?;
-        replace(&self.file(tile), &sealed(&format!("{header}\n{rows}")))
+        replace(&self.file(tile), &text(tile, self.plan, cells)?)
     }
 
     fn read(&self, tile: usize) -> anyhow::Result<Vec<Cell>> {
@@ -148,6 +141,22 @@ impl<'a> Folder<'a> {
 
 fn unusable(file: &Path) -> String {
     format!("cannot use {}; delete it to make it anew", file.display())
+}
+
+/// A tile as its file has it.
+///
+/// # Errors
+/// If a cell cannot be written.
+#[doc(hidden)]
+pub fn text(tile: usize, plan: &Plan, cells: &[Cell]) -> anyhow::Result<String> {
+    let plan = plan.clone();
+    let header = serde_json::to_string(&Header { tile, plan })?;
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for cell in cells {
+        csv.serialize(cell)?;
+    }
+    let rows = String::from_utf8(csv.into_inner()?)?;
+    Ok(sealed(&format!("{header}\n{rows}")))
 }
 
 /// A text behind its check sum.

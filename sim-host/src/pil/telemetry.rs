@@ -44,6 +44,18 @@ pub enum TelemetryError {
         /// What is wrong with it.
         error: FrameError,
     },
+    /// A duty code that its timer cannot hold.
+    #[error(
+        "telemetry is wrong at record {record}: duty code {code} of a PWM period of {period} counts"
+    )]
+    Duty {
+        /// The record.
+        record: u32,
+        /// The code.
+        code: u16,
+        /// The period, counts.
+        period: u16,
+    },
     /// A record is missing.
     #[error("telemetry is incomplete: record {found} follows record {last}")]
     Gap {
@@ -123,8 +135,16 @@ impl Recording {
             let record = Record::decode(&bytes[offset..], header.samples_per_step, duty)
                 .map_err(|error| damaged(offset, &format!("after record {last}"), error))?;
             let found = record.index;
-            if found != last + 1 {
+            if last.checked_add(1) != Some(found) {
                 gap.get_or_insert(TelemetryError::Gap { last, found });
+            }
+            let of_record = &duties[duties.len() - usize::from(header.samples_per_step)..];
+            if let Some(&code) = of_record.iter().find(|&&code| code > header.pwm_period) {
+                return Err(TelemetryError::Duty {
+                    record: found,
+                    code,
+                    period: header.pwm_period,
+                });
             }
             records.push(record);
             offset += length;
