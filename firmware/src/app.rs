@@ -11,7 +11,7 @@ use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::SystemHandler;
 use shared_model::ecu::Ecu;
 use shared_model::open_loop::OpenLoop;
-use shared_model::{InvalidScenario, Scenario};
+use shared_model::{InvalidScenario, MAX_RATIO, Scenario};
 
 /// The watchdog bites when no model step arrives for this many of its periods, or for this long, ms, if that is longer.
 const WATCHDOG_PERIODS: f32 = 4.0;
@@ -88,7 +88,8 @@ fn refuse_command(error: &CommandError) -> ExitCode {
 }
 
 fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
-    match error {
+    // In the words of its `Display`, whose formatting would take flash and panics; a test holds the two together.
+    match *error {
         InvalidScenario::OutOfRange(error) => defmt::error!(
             "scenario refused: {=str}.{=str} = {=f64}: must be a finite number from {=f64} to {=f64}",
             error.section,
@@ -98,20 +99,22 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             error.max
         ),
         InvalidScenario::Rates { control_hz, pwm_hz } => defmt::error!(
-            "scenario refused: run.pwm_rate_hz = {=f64} and run.control_rate_hz = {=f64}: must be whole, the first a multiple of the second",
+            "scenario refused: run.pwm_rate_hz = {=f64} and run.control_rate_hz = {=f64}: both must be whole numbers, the first a multiple of the second, at most {=u32} times it",
             pwm_hz,
-            control_hz
+            control_hz,
+            MAX_RATIO
         ),
         InvalidScenario::TimerPeriod { counts } => defmt::error!(
-            "scenario refused: a carrier period of {=u32} timer counts: must be from 2 to 65535",
-            counts
+            "scenario refused: servo.timer_clock_hz over run.pwm_rate_hz is {=u32} counts: must be from 2 to {=u16}",
+            counts,
+            u16::MAX
         ),
         InvalidScenario::Duration {
             duration_s,
             min_s,
             max_s,
         } => defmt::error!(
-            "scenario refused: run.duration_s = {=f64}: must be from {=f64} to {=f64}",
+            "scenario refused: run.duration_s = {=f64}: must be from {=f64} (one step) to {=f64}",
             duration_s,
             min_s,
             max_s
@@ -120,7 +123,7 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             frequency_rad_per_s,
             max_rad_per_s,
         } => defmt::error!(
-            "scenario refused: dither frequency {=f64} rad/s: must be at most {=f64} rad/s, half the PWM rate",
+            "scenario refused: dither frequency {=f64} rad/s: must be at most {=f64} rad/s, half of run.pwm_rate_hz",
             frequency_rad_per_s,
             max_rad_per_s
         ),
@@ -129,10 +132,11 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             dither_v,
             bus_v,
         } => defmt::error!(
-            "scenario refused: dither.amplitude_v = {=f64} with {=f64} V for the motor exceeds servo.bus_voltage_v = {=f64}",
+            "scenario refused: dither.amplitude_v = {=f64}: with {=f64} V for the motor current it exceeds servo.bus_voltage_v = {=f64}; at most {=f64} V are left for the dither",
             dither_v,
             motor_v,
-            bus_v
+            bus_v,
+            InvalidScenario::left_for_dither_v(motor_v, bus_v)
         ),
     }
     ExitCode::BadScenario

@@ -15,7 +15,7 @@ use core::fmt;
 /// One step, less what rounding to f32 can take from it.
 const ALMOST_ONE: f64 = 1.0 - 1e-6;
 /// Most PWM samples in a model step; a telemetry record holds them all.
-pub(crate) const MAX_RATIO: u32 = 1000;
+pub const MAX_RATIO: u32 = 1000;
 /// Most PWM samples of a run; a counter of 32 bits holds them.
 const MAX_SAMPLES: f64 = 4e9;
 
@@ -426,6 +426,13 @@ pub enum InvalidScenario {
     },
 }
 
+impl InvalidScenario {
+    /// Voltage that the motor leaves for the dither, V.
+    pub fn left_for_dither_v(motor_v: f64, bus_v: f64) -> f64 {
+        (bus_v - motor_v.abs()).max(0.0)
+    }
+}
+
 impl From<OutOfRange> for InvalidScenario {
     fn from(error: OutOfRange) -> Self {
         Self::OutOfRange(error)
@@ -469,7 +476,7 @@ impl fmt::Display for InvalidScenario {
                 f,
                 "dither.amplitude_v = {dither_v}: with {motor_v} V for the motor current it exceeds servo.bus_voltage_v = \
                  {bus_v}; at most {} V are left for the dither",
-                (bus_v - motor_v.abs()).max(0.0)
+                Self::left_for_dither_v(motor_v, bus_v)
             ),
         }
     }

@@ -4,8 +4,8 @@
 //! a CRC-16, so that a flipped bit is found where it is and a stream that was cut short lacks its trailer. The numbers of
 //! the state are their bits: nothing is rounded on the way.
 
+use crate::MAX_RATIO;
 use crate::friction::FrictionMode;
-use crate::scenario::MAX_RATIO;
 use crate::vehicle::State;
 use core::fmt;
 use nalgebra::Vector4;

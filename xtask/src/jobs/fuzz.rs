@@ -83,6 +83,7 @@ fn fuzz(driver: &Path, folder: &Path, name: &str, inputs: u64) -> Result<()> {
     command
         .current_dir(workspace::root())
         .env("FUZZ_TARGET", name)
+        .env("FUZZ_SEEDS", &found)
         .arg(format!("-runs={inputs}"))
         .args(LIMITS)
         .args(["-print_final_stats=1", "-verbosity=0"])
