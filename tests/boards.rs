@@ -151,7 +151,7 @@ fn the_end_of_the_program_is_a_stop() {
 fn a_core_that_does_not_stop_is_a_time_out() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let image = board_image(STM32F405.board(), "fault-drill");
-    let hang = ["hang".to_owned()];
+    let hang = ["fault=hang".to_owned()];
     let mut run = Debugged::start(&image, STM32F405, &hang, folder.path(), TIME_OUT)
         .unwrap_or_else(|error| panic!("{error}"));
     let stop = run.gdb.run_to_stop(Duration::from_millis(300));
@@ -197,8 +197,14 @@ fn faults_put_the_timer_to_neutral() {
     for (fault, exit_code) in [("panic", 13), ("hard-fault", 14), ("stack-overflow", 14)] {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
         let image = board_image(STM32F405.board(), "fault-drill");
-        let finished = run(&image, STM32F405, &[fault.into()], folder.path(), TIME_OUT)
-            .unwrap_or_else(|error| panic!("{fault}: {error}"));
+        let finished = run(
+            &image,
+            STM32F405,
+            &[format!("fault={fault}")],
+            folder.path(),
+            TIME_OUT,
+        )
+        .unwrap_or_else(|error| panic!("{fault}: {error}"));
         assert_eq!(finished.exit_code, exit_code, "{fault}");
         let recording = Recording::open(&folder.path().join("drill.bin"))
             .unwrap_or_else(|error| panic!("{fault}: {error}"));

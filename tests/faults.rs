@@ -25,7 +25,7 @@ fn each_fault_neutralises_the_pwm_and_has_its_exit_code() {
             let finished = run(
                 &image("fault-drill"),
                 machine,
-                &[fault.into()],
+                &[format!("fault={fault}")],
                 folder.path(),
                 TIME_OUT,
             )
@@ -52,7 +52,7 @@ fn a_firmware_that_hangs_is_stopped_and_gone() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let limit = Duration::from_secs(2);
     let start = Instant::now();
-    let settings = ["hang".into(), marker.clone()];
+    let settings = ["fault=hang".into(), marker.clone()];
     let error = run(
         &image("fault-drill"),
         Machine::Mps2An386,
@@ -80,10 +80,10 @@ fn the_runner_says_that_a_firmware_hangs_and_passes_exit_codes_on() {
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
         (output.status.code(), message)
     };
-    let (code, message) = drill(&["hang"]);
+    let (code, message) = drill(&["fault=hang"]);
     assert_eq!(code, Some(2), "{message}");
     assert!(message.contains("did not end within 2 s"), "{message}");
-    let (code, message) = drill(&["hard-fault"]);
+    let (code, message) = drill(&["fault=hard-fault"]);
     assert_eq!(code, Some(14), "{message}");
     assert!(
         message.contains("hard fault; the PWM was put to neutral"),

@@ -192,18 +192,19 @@ fn one_changed_bit_of_a_command_is_seen() {
 fn a_firmware_that_dies_or_refuses_is_said() {
     let (scenario, manoeuvre) = manoeuvre("constant-speed.toml", 0.2);
     let ecu = ecu_scenario(&scenario, &manoeuvre);
-    let start = |name: &str, settings: &[String]| {
+    let start = |options: &[&str], settings: &[String]| {
         let limit = Duration::from_secs(3);
         let machine = Machine::Mps2An386;
-        Session::start(&image(name), machine, settings, LinkKind::Files, &[], limit)
+        let image = image("ecu");
+        Session::start(&image, machine, settings, LinkKind::Files, options, limit)
     };
-    let refused = start("ecu", &["dither.amplitude_v=-1".into()]);
+    let refused = start(&[], &["dither.amplitude_v=-1".into()]);
     let message = refused.err().expect("it is refused").to_string();
     assert!(message.contains("exit code 10"), "{message}");
     assert!(message.contains("dither.amplitude_v"), "{message}");
 
-    // An image that never opens the link.
-    let silent = start("fault-drill", &["hang".into()]).err();
+    // A core that stands still never opens the link.
+    let silent = start(&["-S"], &[]).err();
     assert!(
         matches!(silent, Some(RunError::TimedOut { .. })),
         "{silent:?}"
@@ -211,7 +212,7 @@ fn a_firmware_that_dies_or_refuses_is_said() {
 
     // The host that stops answering is noticed when the pipes close; the emulator ends with the session.
     let settings = sim_host::pil::settings::of(&ecu);
-    let mut session = start("ecu", &settings).expect("it starts");
+    let mut session = start(&[], &settings).expect("it starts");
     session.receive().expect("the first period");
     let error = session.receive().expect_err("it waits for its answer");
     assert!(matches!(error, RunError::TimedOut { .. }), "{error}");

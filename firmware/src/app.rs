@@ -11,8 +11,8 @@ use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::SystemHandler;
 use shared_model::ecu::Ecu;
 use shared_model::open_loop::OpenLoop;
-use shared_model::stability::MOST_STEP_TIMES_RATE;
-use shared_model::{InvalidScenario, Scenario};
+use shared_model::stability::{MOST_STEP_TIMES_RATE, least_rate_hz};
+use shared_model::{InvalidScenario, MAX_RATIO, Scenario};
 
 /// The watchdog bites when no model step arrives for this many of its periods, or for this long, ms, if that is longer.
 const WATCHDOG_PERIODS: f32 = 4.0;
@@ -89,7 +89,8 @@ fn refuse_command(error: &CommandError) -> ExitCode {
 }
 
 fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
-    match error {
+    // In the words of its `Display`, whose formatting would take flash and panics; a test holds the two together.
+    match *error {
         InvalidScenario::OutOfRange(error) => defmt::error!(
             "scenario refused: {=str}.{=str} = {=f64}: must be a finite number from {=f64} to {=f64}",
             error.section,
@@ -99,20 +100,22 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             error.max
         ),
         InvalidScenario::Rates { control_hz, pwm_hz } => defmt::error!(
-            "scenario refused: run.pwm_rate_hz = {=f64} and run.control_rate_hz = {=f64}: must be whole, the first a multiple of the second",
+            "scenario refused: run.pwm_rate_hz = {=f64} and run.control_rate_hz = {=f64}: both must be whole numbers, the first a multiple of the second, at most {=u32} times it",
             pwm_hz,
-            control_hz
+            control_hz,
+            MAX_RATIO
         ),
         InvalidScenario::TimerPeriod { counts } => defmt::error!(
-            "scenario refused: a carrier period of {=u32} timer counts: must be from 2 to 65535",
-            counts
+            "scenario refused: servo.timer_clock_hz over run.pwm_rate_hz is {=u32} counts: must be from 2 to {=u16}",
+            counts,
+            u16::MAX
         ),
         InvalidScenario::Duration {
             duration_s,
             min_s,
             max_s,
         } => defmt::error!(
-            "scenario refused: run.duration_s = {=f64}: must be from {=f64} to {=f64}",
+            "scenario refused: run.duration_s = {=f64}: must be from {=f64} (one step) to {=f64}",
             duration_s,
             min_s,
             max_s
@@ -121,7 +124,7 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             frequency_rad_per_s,
             max_rad_per_s,
         } => defmt::error!(
-            "scenario refused: dither frequency {=f64} rad/s: must be at most {=f64} rad/s, half the PWM rate",
+            "scenario refused: dither frequency {=f64} rad/s: must be at most {=f64} rad/s, half of run.pwm_rate_hz",
             frequency_rad_per_s,
             max_rad_per_s
         ),
@@ -130,21 +133,25 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             dither_v,
             bus_v,
         } => defmt::error!(
-            "scenario refused: dither.amplitude_v = {=f64} with {=f64} V for the motor exceeds servo.bus_voltage_v = {=f64}",
+            "scenario refused: dither.amplitude_v = {=f64}: with {=f64} V for the motor current it exceeds servo.bus_voltage_v = {=f64}; at most {=f64} V are left for the dither",
             dither_v,
             motor_v,
-            bus_v
+            bus_v,
+            InvalidScenario::left_for_dither_v(motor_v, bus_v)
         ),
         InvalidScenario::StepTooLong {
             field,
             rate_hz,
             fastest_rate_per_s,
         } => defmt::error!(
-            "scenario refused: {=str} = {=f64}: the step is too long for the model's fastest rate, {=f64} 1/s: at least {=f64} Hz",
+            "scenario refused: {=str} = {=f64}: the step is too long; {=f64} s times the model's fastest rate, {=f64} 1/s, is {=f64}, and must be at most {=f64}: at least {=f64} Hz",
             field,
             rate_hz,
+            1.0 / rate_hz,
             fastest_rate_per_s,
-            fastest_rate_per_s / MOST_STEP_TIMES_RATE
+            fastest_rate_per_s / rate_hz,
+            MOST_STEP_TIMES_RATE,
+            least_rate_hz(*fastest_rate_per_s)
         ),
     }
     ExitCode::BadScenario
@@ -192,6 +199,7 @@ fn set_priorities() {
 pub fn conclude(overruns: u32) -> ExitCode {
     let stack_bytes = stack::deepest_bytes();
     if overruns == 0 {
+        // The host takes a run for complete only if it sees these words.
         defmt::info!("run complete; deepest stack {=u32} bytes", stack_bytes);
         ExitCode::Complete
     } else {

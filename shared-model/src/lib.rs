@@ -31,4 +31,4 @@ pub mod tire;
 pub mod vehicle;
 
 pub use real::Real;
-pub use scenario::{InvalidScenario, Preset, Scenario};
+pub use scenario::{InvalidScenario, MAX_RATIO, Preset, Scenario};

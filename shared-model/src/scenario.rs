@@ -7,7 +7,7 @@ use crate::friction::{Friction, FrictionLaw};
 use crate::gate::Limits;
 use crate::parameter::{Field, OutOfRange, ParameterSet};
 use crate::servo::Servo;
-use crate::stability::{MOST_STEP_TIMES_RATE, fastest_rate_per_s};
+use crate::stability::{MOST_STEP_TIMES_RATE, fastest_rate_per_s, least_rate_hz};
 use crate::steering::Steering;
 use crate::tire::{LOW_FRICTION_ROAD, MagicFormula, TireModel};
 use crate::vehicle::{SlipForm, Vehicle};
@@ -16,7 +16,7 @@ use core::fmt;
 /// One step, less what rounding to f32 can take from it.
 const ALMOST_ONE: f64 = 1.0 - 1e-6;
 /// Most PWM samples in a model step; a telemetry record holds them all.
-const MAX_RATIO: u32 = 1000;
+pub const MAX_RATIO: u32 = 1000;
 /// Most PWM samples of a run; a counter of 32 bits holds them.
 const MAX_SAMPLES: f64 = 4e9;
 
@@ -454,6 +454,13 @@ pub enum InvalidScenario {
     },
 }
 
+impl InvalidScenario {
+    /// Voltage that the motor leaves for the dither, V.
+    pub fn left_for_dither_v(motor_v: f64, bus_v: f64) -> f64 {
+        (bus_v - motor_v.abs()).max(0.0)
+    }
+}
+
 impl From<OutOfRange> for InvalidScenario {
     fn from(error: OutOfRange) -> Self {
         Self::OutOfRange(error)
@@ -497,22 +504,21 @@ impl fmt::Display for InvalidScenario {
                 f,
                 "dither.amplitude_v = {dither_v}: with {motor_v} V for the motor current it exceeds servo.bus_voltage_v = \
                  {bus_v}; at most {} V are left for the dither",
-                (bus_v - motor_v.abs()).max(0.0)
+                Self::left_for_dither_v(motor_v, bus_v)
             ),
             Self::StepTooLong {
                 field,
                 rate_hz,
                 fastest_rate_per_s,
             } => {
-                let longest_step_s = MOST_STEP_TIMES_RATE / fastest_rate_per_s;
+                let least_hz = least_rate_hz(fastest_rate_per_s);
                 write!(
                     f,
                     "{field} = {rate_hz}: the step is too long; {} s times the model's fastest rate, {fastest_rate_per_s:.0} 1/s, \
-                     is {:.2}, and must be at most {MOST_STEP_TIMES_RATE}: at least {} Hz, a step of {longest_step_s:.2e} s",
+                     is {:.2}, and must be at most {MOST_STEP_TIMES_RATE}: at least {least_hz} Hz, a step of {:.2e} s",
                     1.0 / rate_hz,
                     fastest_rate_per_s / rate_hz,
-                    // Rounded up to a whole number, which the rates must be.
-                    (1.0 / longest_step_s) as u64 + 1
+                    1.0 / least_hz
                 )
             }
         }

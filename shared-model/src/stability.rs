@@ -10,6 +10,11 @@ use crate::{Real, Scenario};
 
 /// Greatest step times rate: the half disc of this radius on the left of the imaginary axis is within the region of stability.
 pub const MOST_STEP_TIMES_RATE: f64 = 2.6;
+/// Least rate of the fixed step that is stable with a model's fastest rate, Hz: a whole number, as the rates must be.
+pub fn least_rate_hz(fastest_rate_per_s: f64) -> f64 {
+    libm::ceil(fastest_rate_per_s / MOST_STEP_TIMES_RATE)
+}
+
 /// Squarings of a matrix whose norm then bounds the greatest eigenvalue: the bound is less than a percent high.
 const SQUARINGS: u32 = 10;
 

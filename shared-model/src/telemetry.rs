@@ -4,6 +4,7 @@
 //! a CRC-16, so that a flipped bit is found where it is and a stream that was cut short lacks its trailer. The numbers of
 //! the state are their bits: nothing is rounded on the way.
 
+use crate::MAX_RATIO;
 use crate::friction::FrictionMode;
 use crate::vehicle::State;
 use core::fmt;
@@ -105,6 +106,19 @@ pub enum FrameError {
     Version(u16),
     /// No such friction mode.
     FrictionMode(u8),
+    /// A number that no run has.
+    OutOfRange {
+        /// Its name.
+        field: &'static str,
+        /// The value.
+        value: u32,
+        /// Least value.
+        min: u32,
+        /// Greatest value.
+        max: u32,
+    },
+    /// The run starts at what is no number.
+    InitialState,
 }
 
 impl fmt::Display for FrameError {
@@ -122,6 +136,13 @@ impl fmt::Display for FrameError {
                 write!(f, "format version {version}; this program reads {VERSION}")
             }
             Self::FrictionMode(code) => write!(f, "unknown friction mode {code}"),
+            Self::OutOfRange {
+                field,
+                value,
+                min,
+                max,
+            } => write!(f, "{field} = {value}: must be from {min} to {max}"),
+            Self::InitialState => f.write_str("the initial state has a number that is not finite"),
         }
     }
 }
@@ -254,21 +275,47 @@ impl Header {
     /// Reads the frame at the start of `bytes`.
     ///
     /// # Errors
-    /// If it is cut short, damaged or of another version.
+    /// If it is cut short, damaged or of another version, or has a number that no run has.
     pub fn decode(bytes: &[u8]) -> Result<Self, FrameError> {
         let mut reader = Reader::new(bytes, HEADER_TAG, HEADER_LEN)?;
         let version = reader.u16();
         if version != VERSION {
             return Err(FrameError::Version(version));
         }
-        Ok(Self {
+        let header = Self {
             samples_per_step: reader.u16(),
             step_rate_hz: reader.u32(),
             pwm_period: reader.u16(),
             cost_clock_hz: reader.u32(),
             instruction_rate_hz: reader.u32(),
             initial: reader.state()?,
-        })
+        };
+        header.validate()?;
+        Ok(header)
+    }
+
+    /// Checks what a header from outside says: a right check sum does not make it that of a run.
+    fn validate(&self) -> Result<(), FrameError> {
+        let samples = u32::from(self.samples_per_step);
+        let period = u32::from(self.pwm_period);
+        let fields = [
+            ("samples_per_step", samples, 1, MAX_RATIO),
+            ("step_rate_hz", self.step_rate_hz, 1, 1_000_000),
+            ("pwm_period", period, 2, u16::MAX.into()),
+            ("cost_clock_hz", self.cost_clock_hz, 1, u32::MAX),
+        ];
+        for (field, value, min, max) in fields {
+            if !(min..=max).contains(&value) {
+                return Err(FrameError::OutOfRange {
+                    field,
+                    value,
+                    min,
+                    max,
+                });
+            }
+        }
+        let is_finite = self.initial.x.iter().all(|value| value.is_finite());
+        is_finite.then_some(()).ok_or(FrameError::InitialState)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Configurations: a preset, a TOML file over it, and command-line options over both.
 
+use crate::bounded;
 use shared_model::settings::Choice;
 use shared_model::{InvalidScenario, Preset, Scenario};
 use std::path::{Path, PathBuf};
@@ -148,9 +149,11 @@ fn table_of(scenario: &Scenario<f64>) -> Table {
 /// # Errors
 /// If it cannot be read, or is no TOML.
 pub fn read(path: &Path) -> Result<Table, ConfigError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Unreadable {
-        path: path.to_path_buf(),
-        source,
+    let text = bounded::read_text(path, bounded::TEXT_BYTES).map_err(|source| {
+        ConfigError::Unreadable {
+            path: path.to_path_buf(),
+            source,
+        }
     })?;
     text.parse().map_err(|source| ConfigError::Syntax {
         path: path.to_path_buf(),

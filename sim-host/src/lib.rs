@@ -29,6 +29,7 @@ compile_error!(
 pub use dynamics::{engine, interrupt, motion};
 
 pub mod averaging;
+pub mod bounded;
 pub mod chaos;
 pub mod characteristics;
 pub mod closed_loop;

@@ -5,6 +5,7 @@ pub mod golden;
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use sim_host::pil::elf::Image;
+use sim_host::pil::log::LogDecoder;
 use sim_host::pil::qemu::{self, Finished, Machine, RunError};
 use sim_host::pil::settings;
 use sim_host::pil::telemetry::Recording;
@@ -87,7 +88,9 @@ pub fn run(
     folder: &Path,
     limit: Duration,
 ) -> Result<Finished, RunError> {
-    qemu::run(image, machine, settings, folder, limit, |_| {})
+    // The fault drill logs nothing.
+    let log = LogDecoder::new(image).map_err(RunError::Log)?;
+    qemu::run_with(&log, image, machine, settings, folder, limit, |_| {})
 }
 
 /// Runs the ECU with a scenario to its end and reads its telemetry.

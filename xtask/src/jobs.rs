@@ -3,6 +3,7 @@
 pub mod coverage;
 pub mod demo;
 pub mod firmware;
+pub mod fuzz;
 pub mod lint;
 pub mod mutants;
 pub mod proofs;

@@ -122,6 +122,22 @@ enum Command {
     /// hour on two cores, so it is no part of `test`. Installs cargo-mutants into target/tools.
     #[command(after_help = "Example:\n  cargo xtask mutants")]
     Mutants,
+
+    /// Gives hostile bytes to every reader of what comes from outside, led by coverage; fails at the first that panics,
+    /// hangs or takes too much memory.
+    ///
+    /// Needs a C++ compiler for libFuzzer. Takes some hours, so it is no part of `test`, which runs the corpus and a fixed
+    /// number of mutations. What is found is kept in target/fuzz and continued from.
+    #[command(
+        after_help = "Examples:\n  cargo xtask fuzz telemetry\n  cargo xtask fuzz --inputs 100000"
+    )]
+    Fuzz {
+        /// One reader, a folder of fuzz/corpus [default: all].
+        target: Option<String>,
+        /// Inputs for each, instead of its usual number.
+        #[arg(long, value_name = "N")]
+        inputs: Option<u64>,
+    },
 }
 
 fn main() -> ExitCode {
@@ -136,6 +152,7 @@ fn main() -> ExitCode {
         Command::Firmware { board } => jobs::firmware::run(&board),
         Command::Coverage => jobs::coverage::run(),
         Command::Mutants => jobs::mutants::run(),
+        Command::Fuzz { target, inputs } => jobs::fuzz::run(target.as_deref(), inputs),
     };
     outcome::report(result)
 }

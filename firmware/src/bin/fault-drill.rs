@@ -1,4 +1,4 @@
-//! Fault drill: the ECU's fault handlers, set off on purpose. The first argument says which.
+//! Fault drill: the ECU's fault handlers, set off on purpose. The first setting, `fault=NAME`, says which.
 //!
 //! `panic`, `hard-fault`, `stack-overflow`, `watchdog` (the main loop stops feeding it) and `hang` (interrupts and watchdog
 //! off, for the runner's time-out).
@@ -21,7 +21,8 @@ fn main() -> ! {
     stack::paint();
     drive_pwm();
     let text = command_line::text().unwrap_or("");
-    match text.split_ascii_whitespace().nth(1) {
+    let setting = text.split_ascii_whitespace().nth(1);
+    match setting.and_then(|setting| setting.strip_prefix("fault=")) {
         Some("panic") => panic!("drill"),
         // SAFETY: not safe, and meant not to be: nothing is mapped there, so the read faults.
         Some("hard-fault") => unsafe {

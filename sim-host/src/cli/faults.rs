@@ -100,11 +100,11 @@ mod processor {
     use sim_host::closed_loop::fault::memory::flips;
     use sim_host::closed_loop::fault::processor::{Action, BENCH_TICKS, Bench};
     use sim_host::closed_loop::levels::Target;
+    use sim_host::interrupt;
     use sim_host::pil::elf::Image;
-    use sim_host::pil::qemu::{INTERRUPTED, Machine, RunError};
+    use sim_host::pil::qemu::{Machine, RunError};
     use sim_host::pil::session::LinkKind;
     use std::path::Path;
-    use std::sync::atomic::Ordering;
     use std::time::Duration;
 
     /// Faults of memory and core, each in an emulator of its own.
@@ -125,7 +125,7 @@ mod processor {
         );
         let progress = progress(Action::EVENTS.len() + flips.len());
         let counted = |row: Result<Row, RunError>| {
-            if INTERRUPTED.load(Ordering::Relaxed) {
+            if interrupt::requested() {
                 return Err(RunError::Interrupted);
             }
             progress.inc(1);

@@ -11,7 +11,7 @@ use sim_host::chaos::flow::{Flow, VehicleFlow};
 use sim_host::chaos::method::{Estimate, Method, estimates};
 use sim_host::chaos::sweep::{Parameter, Timing, Values, Watch, scenarios};
 use sim_host::chaos::synchronisation::Search;
-use sim_host::pil::qemu::INTERRUPTED;
+use sim_host::interrupt;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 use std::time::{Duration, Instant};
 
@@ -224,7 +224,7 @@ fn measure(
     );
     bar.enable_steady_tick(Duration::from_millis(200));
     let watch = Watch {
-        stop: &INTERRUPTED,
+        stop: &interrupt::REQUESTED,
         done: &|| bar.inc(1),
     };
     let by_method = methods

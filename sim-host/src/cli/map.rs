@@ -9,11 +9,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::dither::Waveform;
 use sim_host::chaos::sweep::Watch;
 use sim_host::config::validate;
+use sim_host::interrupt;
 use sim_host::map::cell::{Cell, Kind};
 use sim_host::map::plan::{CELLS_A_TILE, Grid, Plan, Sheet, Start};
 use sim_host::map::table;
 use sim_host::map::tiles::{Folder, Shard, plan_of, put_together};
-use sim_host::pil::qemu::INTERRUPTED;
 use sim_host::report::motion_map;
 use std::io::Write;
 use std::path::PathBuf;
@@ -159,7 +159,7 @@ fn fill(folder: &Folder, shard: Shard) -> anyhow::Result<()> {
     let cells = folder.missing(shard).len() * CELLS_A_TILE;
     let bar = ProgressBar::new(cells as u64).with_style(style);
     let watch = Watch {
-        stop: &INTERRUPTED,
+        stop: &interrupt::REQUESTED,
         done: &|| bar.inc(CELLS_A_TILE as u64),
     };
     let filled = folder.fill(shard, watch);

@@ -6,11 +6,12 @@ use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
+use sim_host::bounded;
 use sim_host::closed_loop::drive::ecu_scenario;
 use sim_host::closed_loop::levels::{Levels, Target, drive};
 use sim_host::closed_loop::manoeuvre::{self, Manoeuvre};
 use sim_host::closed_loop::profile::Profile;
-use sim_host::closed_loop::recording::Recording;
+use sim_host::closed_loop::recording::{MAGIC, Recording};
 use sim_host::closed_loop::run::{Comparison, Depth, compare};
 use sim_host::config::validate;
 use sim_host::pil::elf::Image;
@@ -316,7 +317,9 @@ fn words(comparison: &Comparison) -> String {
 
 fn replay(file: &Path) -> anyhow::Result<Done> {
     let name = file.display();
-    let bytes = std::fs::read(file).with_context(|| format!("cannot read {name}"))?;
+    let is_start = |start: &[u8]| start.starts_with(MAGIC);
+    let bytes = bounded::read(file, bounded::RECORDING_BYTES, is_start)
+        .with_context(|| format!("cannot read {name}"))?;
     let recording = Recording::read(&bytes).with_context(|| name.to_string())?;
     let replayed = recording.replay().with_context(|| name.to_string())?;
     let comparison = compare(&recording.exchanges, &replayed, Depth::Bytes);

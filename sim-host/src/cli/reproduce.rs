@@ -5,7 +5,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::settings::Choice;
 use shared_model::{Preset, Scenario};
 use sim_host::config::{load, validate};
-use sim_host::pil::qemu::INTERRUPTED;
+use sim_host::interrupt;
 use sim_host::reproduce::{Judgement, Options, Progress, Quality, Summary, reproduce};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let summary = reproduce(
         &arguments.out,
         &options,
-        &INTERRUPTED,
+        &interrupt::REQUESTED,
         &|progress| match progress {
             Progress::Begins {
                 number,

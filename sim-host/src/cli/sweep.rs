@@ -9,10 +9,9 @@ use shared_model::dither::Waveform;
 use sim_host::chaos::observe::observe;
 use sim_host::chaos::sweep::{LARGEST_BATCH, Parameter, SweepError, Timing, Values, Watch};
 use sim_host::engine::taylor::Watched;
+use sim_host::interrupt;
 use sim_host::paper::REGION_EDGES_RPM;
-use sim_host::pil::qemu::INTERRUPTED;
 use sim_host::report::chart::{Look, Region, Series};
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// More runs than this have their cost said first.
@@ -139,7 +138,7 @@ pub fn with_progress<R>(runs: usize, work: impl FnOnce(Watch) -> R) -> R {
             .progress_chars("=> ");
     let bar = ProgressBar::new(runs as u64).with_style(style);
     let result = work(Watch {
-        stop: &INTERRUPTED,
+        stop: &interrupt::REQUESTED,
         done: &|| bar.inc(1),
     });
     bar.finish_and_clear();
@@ -148,7 +147,7 @@ pub fn with_progress<R>(runs: usize, work: impl FnOnce(Watch) -> R) -> R {
 
 /// After Ctrl-C: says what was kept, as the reason why the job was not done in full.
 pub fn check_interrupted(done: usize, of: usize) -> anyhow::Result<()> {
-    if INTERRUPTED.load(Ordering::Relaxed) {
+    if interrupt::requested() {
         bail!("interrupted: {done} of {of} runs were made; the files asked for hold these");
     }
     Ok(())

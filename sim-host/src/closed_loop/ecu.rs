@@ -1,7 +1,7 @@
 //! The ECU that a drive has at its other end, wherever it runs.
 
-use crate::pil::qemu::RunError;
-use crate::pil::session::{Ended, Session};
+use crate::pil::qemu::{Finished, RunError};
+use crate::pil::session::Session;
 use shared_model::controller::{Command, Controller};
 use shared_model::dither::Oscillator;
 use shared_model::e2e::Sender;
@@ -171,7 +171,7 @@ impl Processor {
     ///
     /// # Errors
     /// If it does not end.
-    pub fn finish(mut self) -> Result<Ended, RunError> {
+    pub fn finish(mut self) -> Result<Finished, RunError> {
         let received = self.session.receive()?;
         self.session.send(&ToEcu {
             packet: received.packet,

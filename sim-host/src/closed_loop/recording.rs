@@ -9,7 +9,8 @@ use shared_model::Scenario;
 use shared_model::exchange::{PACKET_LEN, Packet, PacketBytes};
 use std::io::Write;
 
-const MAGIC: &[u8; 8] = b"DSLOOP1\n";
+/// First bytes of a recording.
+pub const MAGIC: &[u8; 8] = b"DSLOOP1\n";
 const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 const CHECKSUM_LEN: usize = 4;
 
@@ -61,7 +62,7 @@ impl Recording {
     /// Reads it back.
     ///
     /// # Errors
-    /// If the bytes are no recording, or damaged.
+    /// If the bytes are no recording, or damaged, or its scenario is not valid.
     pub fn read(bytes: &[u8]) -> Result<Self, RecordingError> {
         use RecordingError::{Damaged, NoRecording};
         let body = bytes.strip_prefix(MAGIC).ok_or(NoRecording)?;
@@ -77,8 +78,11 @@ impl Recording {
             return Err(Damaged);
         }
         let scenario = toml::from_str(text);
+        let scenario: Scenario<f32> =
+            scenario.map_err(|error| RecordingError::Scenario(error.to_string()))?;
+        scenario.validate()?;
         Ok(Self {
-            scenario: scenario.map_err(|error| RecordingError::Scenario(error.to_string()))?,
+            scenario,
             exchanges: periods.iter().map(exchange).collect(),
         })
     }

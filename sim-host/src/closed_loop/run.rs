@@ -3,11 +3,11 @@
 use super::drive::Drive;
 use super::ecu::Ecu;
 use super::record::Record;
-use crate::pil::qemu::{INTERRUPTED, RunError};
+use crate::interrupt;
+use crate::pil::qemu::RunError;
 use shared_model::exchange::Packet;
 use shared_model::frame::decode_actuation;
 use shared_model::signal::Actuation;
-use std::sync::atomic::Ordering;
 
 /// What passed in one PWM period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +57,7 @@ pub fn run(
             run.actuations.push(drive.actuation().copied());
         }
         on_period();
-        if INTERRUPTED.load(Ordering::Relaxed) {
+        if interrupt::requested() {
             return Err(RunError::Interrupted);
         }
     }

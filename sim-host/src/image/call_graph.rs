@@ -6,6 +6,7 @@
 //! put together by two instructions.
 
 use super::AnalysisError;
+use super::budget::{self, Budget};
 use super::thumb::{self, Effect};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet};
@@ -14,6 +15,9 @@ use std::collections::{BTreeMap, BTreeSet};
 const STACK_SIZES: &str = ".stack_sizes";
 /// Its words are functions, but the core calls those, no pointer.
 const VECTOR_TABLE: &str = ".vector_table";
+
+/// Longest name of a function that is kept, bytes.
+const LONGEST_NAME: usize = 1024;
 
 /// One function.
 #[derive(Debug, Clone, Default)]
@@ -66,8 +70,8 @@ impl CallGraph {
     /// # Errors
     /// If the image is damaged, or was compiled without the functions' frames.
     pub fn read(bytes: &[u8]) -> Result<Self, AnalysisError> {
-        let file = object::File::parse(bytes)?;
-        let mut functions = named(&file);
+        let file = budget::parse(bytes)?;
+        let mut functions = named(&file)?;
         for (address, bytes) in stack_sizes(&file)? {
             if let Some(function) = functions.get_mut(&address) {
                 function.stated_bytes = Some(bytes);
@@ -77,8 +81,8 @@ impl CallGraph {
             functions,
             address_taken: BTreeSet::new(),
         };
-        graph.sweep(&file)?;
-        graph.find_pointers(&file)?;
+        graph.sweep(&file, Budget::new(bytes.len(), "functions"))?;
+        graph.find_pointers(&file, Budget::new(bytes.len(), "sections"))?;
         Ok(graph)
     }
 
@@ -88,18 +92,21 @@ impl CallGraph {
         functions.find_map(|(&address, function)| function.names.contains(name).then_some(address))
     }
 
-    fn sweep(&mut self, file: &object::File<'_>) -> Result<(), AnalysisError> {
+    fn sweep(&mut self, file: &object::File<'_>, mut budget: Budget) -> Result<(), AnalysisError> {
         let starts: Vec<u32> = self.functions.keys().copied().collect();
         let data = Marks::read(file);
         for section in file.sections().filter(|s| s.kind() == SectionKind::Text) {
             let code = Words::of(&section)?;
-            let inside = |start: &u32| (code.start..code.end()).contains(start);
-            for (index, &start) in starts.iter().enumerate().filter(|(_, start)| inside(start)) {
+            let first = starts.partition_point(|&start| start < code.start);
+            let behind = starts.partition_point(|&start| start < code.end);
+            for index in first..behind {
+                let start = starts[index];
                 let next = starts.get(index + 1).copied().unwrap_or(u32::MAX);
                 let end = match self.functions[&start].length_bytes {
-                    0 => next.min(code.end()),
-                    length => start + length,
+                    0 => next.min(code.end),
+                    length => start.saturating_add(length).min(code.end),
                 };
+                budget.spend(1 + u64::from(end - start))?;
                 self.sweep_function(&code, start..end, &data);
             }
         }
@@ -113,16 +120,19 @@ impl CallGraph {
         while address < range.end {
             if marks.is_data(address) {
                 self.note_pointer(code.word(address).filter(|_| address.is_multiple_of(4)));
-                address += 2;
+                address = address.saturating_add(2);
                 continue;
             }
-            let (Some(first), second) = (code.half(address), code.half(address + 2)) else {
+            let (Some(first), second) = (code.half(address), code.half(address.saturating_add(2)))
+            else {
                 break;
             };
             let (length, effect) = thumb::decode(address, first, second.unwrap_or(0));
             match effect {
                 Effect::None => {}
-                Effect::Push(bytes) => swept.counted_bytes += bytes,
+                Effect::Push(bytes) => {
+                    swept.counted_bytes = swept.counted_bytes.saturating_add(bytes);
+                }
                 Effect::SetStackPointer => swept.sets_stack_pointer = true,
                 Effect::Indirect => swept.indirect_calls += 1,
                 Effect::Branch(target) if range.contains(&target) => {}
@@ -144,7 +154,7 @@ impl CallGraph {
             if let Effect::LowHalf(_, half) = effect {
                 self.note_pointer(Some(half));
             }
-            address += length;
+            address = address.saturating_add(length);
         }
         if let Some(function) = self.functions.get_mut(&range.start) {
             *function = Function {
@@ -156,7 +166,11 @@ impl CallGraph {
         }
     }
 
-    fn find_pointers(&mut self, file: &object::File<'_>) -> Result<(), AnalysisError> {
+    fn find_pointers(
+        &mut self,
+        file: &object::File<'_>,
+        mut budget: Budget,
+    ) -> Result<(), AnalysisError> {
         let is_data = |kind| {
             matches!(
                 kind,
@@ -168,7 +182,9 @@ impl CallGraph {
                 continue;
             }
             let words = Words::of(&section)?;
-            for address in (words.start.next_multiple_of(4)..words.end()).step_by(4) {
+            budget.spend(words.bytes.len() as u64)?;
+            let first = words.start.checked_next_multiple_of(4);
+            for address in (first.unwrap_or(words.end)..words.end).step_by(4) {
                 self.note_pointer(words.word(address));
             }
         }
@@ -185,19 +201,48 @@ impl CallGraph {
 }
 
 /// The functions by address, with their names only.
-pub(super) fn named(file: &object::File<'_>) -> BTreeMap<u32, Function> {
+pub(super) fn named(file: &object::File<'_>) -> Result<BTreeMap<u32, Function>, AnalysisError> {
     let mut functions = BTreeMap::new();
     for symbol in file.symbols().filter(|s| s.kind() == SymbolKind::Text) {
         let Ok(name) = symbol.name() else { continue };
         if name.is_empty() || name.starts_with('$') || symbol.is_undefined() {
             continue;
         }
-        let function: &mut Function = functions.entry(symbol.address() as u32 & !1).or_default();
-        let name = format!("{:#}", rustc_demangle::demangle(name));
-        function.names.insert(name);
-        function.length_bytes = function.length_bytes.max(symbol.size() as u32);
+        let address = address_of(symbol.address())? & !1;
+        let function: &mut Function = functions.entry(address).or_default();
+        function.names.insert(demangled(name));
+        let length = u32::try_from(symbol.size()).unwrap_or(u32::MAX);
+        function.length_bytes = function.length_bytes.max(length);
     }
-    functions
+    Ok(functions)
+}
+
+fn address_of(address: u64) -> Result<u32, AnalysisError> {
+    u32::try_from(address).map_err(|_| AnalysisError::Address(address))
+}
+
+/// A name without the compiler's hashes; a few bytes of a mangled one may stand for megabytes, which are cut off.
+fn demangled(name: &str) -> String {
+    struct Short(String);
+    impl std::fmt::Write for Short {
+        fn write_str(&mut self, piece: &str) -> std::fmt::Result {
+            let room = LONGEST_NAME - self.0.len();
+            let end = piece.floor_char_boundary(room);
+            self.0.push_str(&piece[..end]);
+            if end == piece.len() {
+                Ok(())
+            } else {
+                Err(std::fmt::Error)
+            }
+        }
+    }
+    let mut short = Short(String::new());
+    // An error is the end of what is kept.
+    let _ = std::fmt::write(
+        &mut short,
+        format_args!("{:#}", rustc_demangle::demangle(name)),
+    );
+    short.0
 }
 
 /// Address and frame of each compiled function: a word, and a number in LEB128.
@@ -226,23 +271,24 @@ fn stack_sizes(file: &object::File<'_>) -> Result<Vec<(u32, u32)>, AnalysisError
 /// A section's bytes at their addresses.
 struct Words<'a> {
     start: u32,
+    end: u32,
     bytes: &'a [u8],
 }
 
 impl<'a> Words<'a> {
     fn of(section: &impl ObjectSection<'a>) -> Result<Self, AnalysisError> {
+        let bytes = section.data()?;
+        let start = section.address();
         Ok(Self {
-            start: section.address() as u32,
-            bytes: section.data()?,
+            start: address_of(start)?,
+            end: address_of(start.saturating_add(bytes.len() as u64))?,
+            bytes,
         })
     }
 
-    fn end(&self) -> u32 {
-        self.start + self.bytes.len() as u32
-    }
-
     fn at<const N: usize>(&self, address: u32) -> Option<[u8; N]> {
-        let bytes = self.bytes.get((address - self.start) as usize..)?;
+        let offset = address.checked_sub(self.start)?;
+        let bytes = self.bytes.get(offset as usize..)?;
         bytes.first_chunk().copied()
     }
 

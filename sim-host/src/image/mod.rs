@@ -4,9 +4,11 @@
 //! |---|---|
 //! | how much flash and RAM does it take, and how much is there? | [`memory`] |
 //! | which function calls which, with what on the stack? | [`call_graph`] |
+//! | is a damaged image read in a time that its length bounds? | `budget` |
 //! | what does one instruction do to stack and flow? | [`thumb`] |
 //! | how deep can the stack get? | [`stack`] |
 
+mod budget;
 pub mod call_graph;
 pub mod memory;
 pub mod stack;
@@ -29,17 +31,27 @@ pub enum AnalysisError {
         "the image has no section .stack_sizes; `cargo xtask proofs` builds one with -Zemit-stack-sizes"
     )]
     NoStackSizes,
+    /// Names or functions lie over each other, so that reading them takes far longer than the file is.
+    #[error(
+        "the image's {0} overlap, so that they are many times as long as the file; it is damaged"
+    )]
+    Overlap(&'static str),
+    /// A symbol or a section lies beyond the addresses of 32 bits.
+    #[error("the image has {0:#x} as an address, which has more than 32 bits")]
+    Address(u64),
     /// The section with the functions' frames breaks off.
     #[error("the section .stack_sizes is damaged")]
     StackSizes,
 }
+
+pub(crate) use budget::parse;
 
 /// Names of all functions in an image, without the compiler's hashes.
 ///
 /// # Errors
 /// If it is no ELF, or damaged.
 pub fn function_names(bytes: &[u8]) -> Result<Vec<String>, AnalysisError> {
-    let file = object::File::parse(bytes)?;
-    let functions = call_graph::named(&file).into_values();
+    let file = budget::parse(bytes)?;
+    let functions = call_graph::named(&file)?.into_values();
     Ok(functions.flat_map(|function| function.names).collect())
 }

@@ -79,7 +79,7 @@ impl Stack {
     /// # Errors
     /// If it is damaged, was compiled without the functions' frames, or lacks a symbol that every image of the firmware has.
     pub fn analyse(bytes: &[u8]) -> Result<Self, AnalysisError> {
-        let file = object::File::parse(bytes)?;
+        let file = super::parse(bytes)?;
         let room =
             address_of(&file, "_stack_start")?.saturating_sub(address_of(&file, "_stack_end")?);
         Self::of(&CallGraph::read(bytes)?, &LEVELS, room as u32)
@@ -106,8 +106,9 @@ impl Stack {
         let stated = || functions().filter(|function| function.stated_bytes.is_some());
         let indirect = functions().filter(|function| function.indirect_calls > 0);
         Ok(Self {
-            worst_bytes: found.iter().map(|level| level.bytes).sum::<u32>()
-                + exception_frames_bytes,
+            worst_bytes: found.iter().fold(exception_frames_bytes, |sum, level| {
+                sum.saturating_add(level.bytes)
+            }),
             levels: found,
             exception_frames_bytes,
             room_bytes,
@@ -127,17 +128,50 @@ fn is_confirmed(function: &Function) -> bool {
     function.stated_bytes == Some(function.counted_bytes)
 }
 
-/// The deepest path below a function.
+/// What is called: a function, or whatever a pointer may point to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Callee {
+    Function(u32),
+    ByPointer,
+}
+
+/// The deepest path below a callee.
 #[derive(Debug, Clone, Copy)]
 struct Deepest {
     bytes: u32,
-    next: Option<u32>,
+    next: Option<Callee>,
+}
+
+/// A callee whose own are being looked at.
+struct Open<'a> {
+    callee: Callee,
+    own_bytes: u32,
+    deepest: Deepest,
+    calls: std::collections::btree_set::Iter<'a, u32>,
+    by_pointer: bool,
+}
+
+impl Open<'_> {
+    fn next(&mut self) -> Option<Callee> {
+        let function = self.calls.next().copied().map(Callee::Function);
+        function.or_else(|| std::mem::take(&mut self.by_pointer).then_some(Callee::ByPointer))
+    }
+
+    fn called(&mut self, callee: Callee, bytes: u32) {
+        let bytes = self.own_bytes.saturating_add(bytes);
+        if bytes > self.deepest.bytes {
+            self.deepest = Deepest {
+                bytes,
+                next: Some(callee),
+            };
+        }
+    }
 }
 
 struct Search<'a> {
     graph: &'a CallGraph,
-    /// What is known; `None` while a function is being looked at.
-    known: BTreeMap<u32, Option<Deepest>>,
+    /// What is known; `None` while a callee is open.
+    known: BTreeMap<Callee, Option<Deepest>>,
     problems: Vec<String>,
 }
 
@@ -161,7 +195,7 @@ impl<'a> Search<'a> {
                 .graph
                 .find(entry)
                 .ok_or(AnalysisError::NoSymbol(entry))?;
-            let bytes = self.deepest(function);
+            let bytes = self.deepest(Callee::Function(function));
             if deepest.is_none_or(|(most, _)| bytes > most) {
                 deepest = Some((bytes, function));
             }
@@ -174,64 +208,89 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Bytes of stack below the function's caller.
-    fn deepest(&mut self, address: u32) -> u32 {
-        let Some(function) = self.graph.functions.get(&address) else {
-            return 0;
-        };
-        match self.known.get(&address) {
-            Some(Some(known)) => return known.bytes,
-            Some(None) => {
-                self.problems
-                    .push(format!("{} calls itself", function.name()));
-                return 0;
+    /// Bytes of stack below the caller. Not by recursion, whose depth would be that of the image.
+    fn deepest(&mut self, entry: Callee) -> u32 {
+        if let Some(Some(known)) = self.known.get(&entry) {
+            return known.bytes;
+        }
+        let mut open = vec![self.open(entry)];
+        loop {
+            let top = open.last_mut().expect("the entry is closed last");
+            if let Some(callee) = top.next() {
+                match self.known.get(&callee) {
+                    Some(Some(known)) => top.called(callee, known.bytes),
+                    Some(None) => {
+                        let again = self.name(match callee {
+                            Callee::Function(_) => callee,
+                            Callee::ByPointer => top.callee,
+                        });
+                        self.problems.push(format!("{again} calls itself"));
+                    }
+                    None => open.push(self.open(callee)),
+                }
+                continue;
             }
-            None => {}
-        }
-        self.known.insert(address, None);
-        for stray in &function.strays {
-            let problem = format!("{} goes to {stray:#x}, no function", function.name());
-            self.problems.push(problem);
-        }
-        let own = function.frame_bytes().unwrap_or_else(|| {
-            let problem = format!("{} sets the stack pointer itself", function.name());
-            self.problems.push(problem);
-            0
-        });
-        let pointers = (function.indirect_calls > 0).then_some(&self.graph.address_taken);
-        let mut deepest = Deepest {
-            bytes: own,
-            next: None,
-        };
-        for &called in function.calls.iter().chain(pointers.into_iter().flatten()) {
-            let bytes = own + self.deepest(called);
-            if bytes > deepest.bytes {
-                deepest = Deepest {
-                    bytes,
-                    next: Some(called),
-                };
+            let Open {
+                callee, deepest, ..
+            } = open.pop().expect("it is there");
+            self.known.insert(callee, Some(deepest));
+            match open.last_mut() {
+                Some(caller) => caller.called(callee, deepest.bytes),
+                None => return deepest.bytes,
             }
         }
-        self.known.insert(address, Some(deepest));
-        deepest.bytes
+    }
+
+    /// A callee with its own part, and its problems noted.
+    fn open(&mut self, callee: Callee) -> Open<'a> {
+        let graph = self.graph;
+        self.known.insert(callee, None);
+        let (own_bytes, calls, by_pointer) = match callee {
+            Callee::ByPointer => (0, &graph.address_taken, false),
+            Callee::Function(address) => {
+                let function = &graph.functions[&address];
+                for stray in &function.strays {
+                    let problem = format!("{} goes to {stray:#x}, no function", function.name());
+                    self.problems.push(problem);
+                }
+                let own = function.frame_bytes().unwrap_or_else(|| {
+                    let problem = format!("{} sets the stack pointer itself", function.name());
+                    self.problems.push(problem);
+                    0
+                });
+                (own, &function.calls, function.indirect_calls > 0)
+            }
+        };
+        Open {
+            callee,
+            own_bytes,
+            deepest: Deepest {
+                bytes: own_bytes,
+                next: None,
+            },
+            calls: calls.iter(),
+            by_pointer,
+        }
+    }
+
+    fn name(&self, callee: Callee) -> &'a str {
+        match callee {
+            Callee::Function(address) => self.graph.functions[&address].name(),
+            Callee::ByPointer => "what a pointer may point to",
+        }
     }
 
     fn path(&self, entry: u32) -> Vec<(String, u32)> {
         let mut path = Vec::new();
-        let mut at = Some(entry);
-        while let Some((function, address)) =
-            at.and_then(|at| Some((self.graph.functions.get(&at)?, at)))
-        {
-            path.push((
-                function.name().to_owned(),
-                function.frame_bytes().unwrap_or(0),
-            ));
-            at = self
-                .known
-                .get(&address)
-                .copied()
-                .flatten()
-                .and_then(|deepest| deepest.next);
+        let mut at = Some(Callee::Function(entry));
+        while let Some(callee) = at {
+            if let Callee::Function(address) = callee {
+                let function = &self.graph.functions[&address];
+                let bytes = function.frame_bytes().unwrap_or(0);
+                path.push((function.name().to_owned(), bytes));
+            }
+            let deepest = self.known.get(&callee).copied().flatten();
+            at = deepest.and_then(|deepest| deepest.next);
         }
         path
     }

@@ -81,6 +81,59 @@ impl Cell {
             dither_amplitude_v: self.dither_amplitude_v,
         }
     }
+
+    /// Checks a cell that comes from outside.
+    ///
+    /// # Errors
+    /// The column with a value that no cell has.
+    pub fn validate(&self) -> Result<(), InvalidCell> {
+        let signed = [("exponent_per_s", self.exponent_per_s)];
+        let magnitudes = [
+            (
+                "exponent_standard_error_per_s",
+                self.exponent_standard_error_per_s,
+            ),
+            ("exponent_threshold_per_s", self.exponent_threshold_per_s),
+            (
+                "yaw_rate_peak_to_peak_rad_per_s",
+                self.yaw_rate_peak_to_peak_rad_per_s,
+            ),
+            (
+                "steering_angle_peak_to_peak_rad",
+                self.steering_angle_peak_to_peak_rad,
+            ),
+            ("diverges_at_s", self.diverges_at_s),
+        ];
+        let is_bad = |&(_, value): &(_, f64), least| value.is_nan() || value < least;
+        let given = |(column, value): (_, Option<f64>)| Some((column, value?));
+        let mut signed = signed.into_iter().filter_map(given);
+        let mut magnitudes = magnitudes.into_iter().filter_map(given);
+        let bad = signed.find(|number| is_bad(number, f64::NEG_INFINITY));
+        let bad = bad.or_else(|| magnitudes.find(|number| is_bad(number, 0.0)));
+        if let Some((column, value)) = bad {
+            return Err(InvalidCell::Number { column, value });
+        }
+        if (self.kind == Kind::Diverges) != self.diverges_at_s.is_some() {
+            return Err(InvalidCell::Divergence);
+        }
+        Ok(())
+    }
+}
+
+/// Why a cell is none.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum InvalidCell {
+    /// A number that a motion cannot have.
+    #[error("{column} = {value}: must be a number, and at least 0 unless it is an exponent")]
+    Number {
+        /// The column.
+        column: &'static str,
+        /// The value.
+        value: f64,
+    },
+    /// The kind and the time of a divergence contradict each other.
+    #[error("diverges_at_s must be there if the kind is diverges, and only then")]
+    Divergence,
 }
 
 /// The cells at some places of a plan.

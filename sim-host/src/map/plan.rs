@@ -9,6 +9,10 @@ use shared_model::{InvalidScenario, Scenario};
 
 /// Cells of a tile: so many that no lane of the engine waits long for another.
 pub const CELLS_A_TILE: usize = 128;
+/// Most sheets of a map: one of each waveform and start.
+pub const MOST_SHEETS: usize = 6;
+/// Longest run of a cell, s: that of a scenario.
+pub const MOST_TIME_S: f64 = 1e6;
 /// Most cells of a map: their rows take some GB.
 pub const MOST_CELLS: usize = 10_000_000;
 
@@ -108,6 +112,18 @@ pub enum PlanError {
         /// Its cells.
         cells: usize,
     },
+    /// A map without sheets, or with more than there are waveforms and starts.
+    #[error("the map has {sheets} sheets; it must have 1 to {MOST_SHEETS}")]
+    Sheets {
+        /// Its sheets.
+        sheets: usize,
+    },
+    /// Runs that nobody could wait for.
+    #[error("each run of the map takes {time_s} s; it must take at most {MOST_TIME_S} s")]
+    Time {
+        /// Length of a run, s.
+        time_s: f64,
+    },
     /// Sheets of different sizes.
     #[error("the sheets of a map must have as many amplitudes each")]
     Uneven,
@@ -150,6 +166,12 @@ impl Plan {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn validate(&self) -> Result<(), PlanError> {
+        // First what all else is counted by.
+        let sheets = self.sheets.len();
+        if sheets == 0 || sheets > MOST_SHEETS {
+            return Err(PlanError::Sheets { sheets });
+        }
+        self.timing()?;
         self.speeds_rpm.validate("wheel speed (rpm)")?;
         for sheet in &self.sheets {
             sheet.amplitudes_v.validate("dither amplitude (V)")?;
@@ -172,6 +194,27 @@ impl Plan {
             }
         }
         Ok(())
+    }
+
+    /// Times of each run, checked.
+    ///
+    /// # Errors
+    /// If nothing of a run is observed, or one is too long.
+    pub fn timing(&self) -> Result<Timing, PlanError> {
+        let Self {
+            transient_s,
+            observed_s,
+            ..
+        } = *self;
+        let time_s = transient_s + observed_s;
+        if time_s > MOST_TIME_S {
+            return Err(PlanError::Time { time_s });
+        }
+        Timing::new(transient_s, time_s)?;
+        Ok(Timing {
+            transient_s,
+            observed_s,
+        })
     }
 
     /// In what it differs from another plan, each as `key is its value, not the other's`.

@@ -7,18 +7,21 @@ use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
 use parquet::file::metadata::{FileMetaData, KeyValue};
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::fs::File;
 use std::io::Write;
+use std::panic::UnwindSafe;
 use std::sync::Arc;
 
 /// Key of the file's metadata under which the plan is, as JSON.
 pub const PLAN_KEY: &str = "plan";
+
+/// Most rows that a byte of a file can hold: neighbours differ in at least one number, which takes a bit.
+const MOST_ROWS_A_BYTE: u64 = 8;
 
 /// Key of the CRC-32 of plan and cells as JSON: the format's own pages carry none.
 const CHECKSUM_KEY: &str = "crc32";
@@ -74,23 +77,33 @@ pub fn write(plan: &Plan, cells: &[Cell], to: impl Write + Send) -> anyhow::Resu
 ///
 /// # Errors
 /// If it is no table that this version of the program has written, or a damaged one.
-pub fn read(from: File) -> anyhow::Result<(Plan, Vec<Cell>)> {
+pub fn read(from: impl ChunkReader + UnwindSafe + 'static) -> anyhow::Result<(Plan, Vec<Cell>)> {
     // Some damage makes the crate panic.
     let table = std::panic::catch_unwind(|| read_whole(from));
     table.unwrap_or_else(|_| bail!("it is damaged"))
 }
 
-fn read_whole(from: File) -> anyhow::Result<(Plan, Vec<Cell>)> {
+fn read_whole(from: impl ChunkReader + 'static) -> anyhow::Result<(Plan, Vec<Cell>)> {
     let none = "it is no Parquet file, or not a whole one";
+    let length = from.len();
     let table = SerializedFileReader::new(from).context(none)?;
     let plan = plan(table.metadata().file_metadata())?;
-    let rows = table.get_row_iter(None)?;
-    let cells = rows.map(|row| cell(&row?)).collect::<Result<Vec<_>, _>>()?;
-    let places = (0..plan.tiles()).flat_map(|tile| plan.places(tile));
+    // Rows of a few bytes may claim to be any number, so they are counted against the plan and the file before and while
+    // they are read.
+    let few = "its rows are not the cells of its plan";
     ensure!(
-        cells.iter().map(Cell::place).eq(places),
-        "its rows are not the cells of its plan"
+        table.metadata().file_metadata().num_rows() == plan.cells() as i64
+            && plan.cells() as u64 <= MOST_ROWS_A_BYTE * length,
+        few
     );
+    let mut cells = Vec::with_capacity(plan.cells());
+    let mut places = (0..plan.tiles()).flat_map(|tile| plan.places(tile));
+    for row in table.get_row_iter(None)? {
+        let cell = cell(&row?)?;
+        ensure!(places.next() == Some(cell.place()), few);
+        cells.push(cell);
+    }
+    ensure!(places.next().is_none(), few);
     let noted = noted(table.metadata().file_metadata(), CHECKSUM_KEY);
     ensure!(
         noted == Some(checksum(&plan, &cells)?.as_str()),
@@ -139,7 +152,10 @@ fn cell(row: &Row) -> anyhow::Result<Cell> {
     };
     let fields = row.get_column_iter().map(named);
     let fields = Value::Object(fields.collect::<Result<_, _>>()?);
-    serde_json::from_value(fields).context("a row is no cell of a map")
+    let none = "a row is no cell of a map";
+    let cell: Cell = serde_json::from_value(fields).context(none)?;
+    cell.validate().context(none)?;
+    Ok(cell)
 }
 
 fn columns(cells: &[Cell]) -> anyhow::Result<Vec<Column>> {

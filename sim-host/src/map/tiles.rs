@@ -1,10 +1,13 @@
 //! The tiles of a map, each in a file that is complete or not there.
 //!
-//! A tile's file is a line of JSON, with the tile's number and the whole plan, and below it the rows of its cells as CSV. What one
-//! run leaves, another goes on from; what several machines make is put together.
+//! A tile's file is a line with the CRC-32 of all below it, a line of JSON with the tile's number and the whole plan, and the rows
+//! of its cells as CSV. What one run leaves, another continues from; what several machines make is put together. A file with one
+//! byte changed is refused, and so is a plan or a cell that is none, whatever its check sum: no count of a plan is believed
+//! before the plan is checked.
 
 use super::cell::{Cell, cells};
-use super::plan::{Place, Plan};
+use super::plan::{CELLS_A_TILE, Place, Plan};
+use crate::bounded;
 use crate::chaos::sweep::Watch;
 use crate::report::file::replace;
 use anyhow::{Context, bail, ensure};
@@ -14,6 +17,11 @@ use std::path::{Path, PathBuf};
 
 /// Missing tiles that a message names.
 const NAMED: usize = 10;
+/// What the first line says before the check sum.
+const CHECKSUM_KEY: &str = "crc32 ";
+const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+/// Longest file of a tile, bytes: longest plan, and rows of the longest numbers.
+const MOST_BYTES: u64 = 64 * 1024 + 512 * CELLS_A_TILE as u64;
 
 /// Every `of`-th tile of a map: what one of several machines makes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,7 +86,7 @@ impl<'a> Folder<'a> {
             plan,
         };
         if let Some(other) = first_tile(path)? {
-            let plan = header(&other)?.plan;
+            let plan = read(&other)?.0.plan;
             ensure!(
                 plan == *folder.plan,
                 "{} holds tiles of another map: {}; give another --work, or delete them",
@@ -111,40 +119,95 @@ impl<'a> Folder<'a> {
     }
 
     fn write(&self, tile: usize, cells: &[Cell]) -> anyhow::Result<()> {
-        let plan = self.plan.clone();
-        let header = serde_json::to_string(&Header { tile, plan })?;
-        let mut csv = csv::Writer::from_writer(Vec::new());
-        for cell in cells {
-            csv.serialize(cell)?;
-        }
-        let rows = String::from_utf8(csv.into_inner()?)?;
-        replace(&self.file(tile), &format!("{header}\n{rows}"))
+        replace(&self.file(tile), &text(tile, self.plan, cells)?)
     }
 
     fn read(&self, tile: usize) -> anyhow::Result<Vec<Cell>> {
         let file = self.file(tile);
-        let cells = || -> anyhow::Result<Vec<Cell>> {
-            let text = fs::read_to_string(&file)?;
-            let (first, rows) = text.split_once('\n').context("it has no rows")?;
-            let header: Header = serde_json::from_str(first)?;
+        let (header, cells) = read(&file)?;
+        let is_own = || {
             ensure!(
                 header.plan == *self.plan,
                 "it is of another map: {}",
                 header.plan.differences(self.plan).join(", ")
             );
             ensure!(header.tile == tile, "it is tile {}", header.tile);
-            let cells = csv::Reader::from_reader(rows.as_bytes())
-                .into_deserialize()
-                .collect::<Result<Vec<Cell>, _>>()?;
-            let places: Vec<Place> = cells.iter().map(Cell::place).collect();
-            ensure!(
-                places == self.plan.places(tile),
-                "its cells are not complete"
-            );
-            Ok(cells)
+            Ok(())
         };
-        cells().with_context(|| format!("cannot use {}; delete it to make it anew", file.display()))
+        is_own().with_context(|| unusable(&file))?;
+        Ok(cells)
     }
+}
+
+fn unusable(file: &Path) -> String {
+    format!("cannot use {}; delete it to make it anew", file.display())
+}
+
+/// A tile as its file has it.
+///
+/// # Errors
+/// If a cell cannot be written.
+#[doc(hidden)]
+pub fn text(tile: usize, plan: &Plan, cells: &[Cell]) -> anyhow::Result<String> {
+    let plan = plan.clone();
+    let header = serde_json::to_string(&Header { tile, plan })?;
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for cell in cells {
+        csv.serialize(cell)?;
+    }
+    let rows = String::from_utf8(csv.into_inner()?)?;
+    Ok(sealed(&format!("{header}\n{rows}")))
+}
+
+/// A text behind its check sum.
+fn sealed(text: &str) -> String {
+    format!(
+        "{CHECKSUM_KEY}{:08x}\n{text}",
+        CHECKSUM.checksum(text.as_bytes())
+    )
+}
+
+/// A file with its check sum made right: for those that test what lies behind it.
+#[doc(hidden)]
+pub fn resealed(tile: &str) -> String {
+    sealed(tile.split_once('\n').map_or("", |(_, text)| text))
+}
+
+fn read(file: &Path) -> anyhow::Result<(Header, Vec<Cell>)> {
+    let text = bounded::read_text(file, MOST_BYTES);
+    let tile = text.map_err(Into::into).and_then(|text| parse(&text));
+    tile.with_context(|| unusable(file))
+}
+
+/// The plan and the cells in a tile's text.
+///
+/// # Errors
+/// If it is none, a byte of it was changed, or its plan or a cell is none.
+#[doc(hidden)]
+pub fn parsed(tile: &str) -> anyhow::Result<(Plan, Vec<Cell>)> {
+    parse(tile).map(|(header, cells)| (header.plan, cells))
+}
+
+fn parse(tile: &str) -> anyhow::Result<(Header, Vec<Cell>)> {
+    let (_, text) = tile.split_once('\n').context("it has no check sum")?;
+    ensure!(
+        tile == sealed(text),
+        "its check sum does not fit: it was changed by hand, damaged, or made by another version"
+    );
+    let (header, rows) = text.split_once('\n').context("it has no rows")?;
+    let header: Header = serde_json::from_str(header)?;
+    header.plan.validate().context("its plan is none")?;
+    let tiles = header.plan.tiles();
+    ensure!(header.tile < tiles, "it is tile {} of {tiles}", header.tile);
+    let mut reader = csv::Reader::from_reader(rows.as_bytes());
+    let cells = reader.deserialize().collect::<Result<Vec<Cell>, _>>()?;
+    cells.iter().try_for_each(Cell::validate)?;
+    let places: Vec<Place> = cells.iter().map(Cell::place).collect();
+    ensure!(
+        places == header.plan.places(header.tile),
+        "its cells are not complete"
+    );
+    Ok((header, cells))
 }
 
 /// The plan of the tiles in a folder.
@@ -153,7 +216,7 @@ impl<'a> Folder<'a> {
 /// If there is none, or it cannot be read.
 pub fn plan_of(path: &Path) -> anyhow::Result<Plan> {
     let tile = first_tile(path)?.with_context(|| format!("{} has no tiles", path.display()))?;
-    Ok(header(&tile)?.plan)
+    Ok(read(&tile)?.0.plan)
 }
 
 /// All cells of a map from tiles in one or several folders, in the map's order.
@@ -192,10 +255,4 @@ fn first_tile(path: &Path) -> anyhow::Result<Option<PathBuf>> {
     };
     let files = files.iter().map(fs::DirEntry::path);
     Ok(files.filter(is_tile).min())
-}
-
-fn header(file: &Path) -> anyhow::Result<Header> {
-    let unusable = || format!("cannot use {}; delete it to make it anew", file.display());
-    let text = fs::read_to_string(file).with_context(unusable)?;
-    serde_json::from_str(text.lines().next().unwrap_or_default()).with_context(unusable)
 }

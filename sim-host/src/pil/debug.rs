@@ -1,9 +1,10 @@
 //! A run that is watched and steered from outside: the emulator with its gdb stub and its machine protocol.
 
 use crate::pil::elf::Image;
+use crate::pil::emulator::Emulator;
 use crate::pil::gdb::Gdb;
 use crate::pil::log::LogDecoder;
-use crate::pil::qemu::{self, Emulator, Finished, Machine, RunError};
+use crate::pil::qemu::{self, Finished, Machine, RunError};
 use crate::pil::qmp::Qmp;
 use std::path::Path;
 use std::time::Duration;

@@ -1,5 +1,7 @@
 //! The firmware's image: is it one for this machine, and how large is it?
 
+use crate::bounded;
+use crate::image;
 use object::{Architecture, Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
 use std::path::{Path, PathBuf};
 
@@ -63,11 +65,22 @@ impl Image {
     /// If the file cannot be read or is no ELF for 32-bit Arm.
     pub fn open(path: &Path) -> Result<Self, ImageError> {
         let path = path.to_path_buf();
-        let bytes = std::fs::read(&path).map_err(|source| ImageError::Unreadable {
-            path: path.clone(),
-            source,
+        let is_elf = |start: &[u8]| start.starts_with(&elf::ELFMAG);
+        let bytes = bounded::read(&path, bounded::IMAGE_BYTES, is_elf).map_err(|source| {
+            ImageError::Unreadable {
+                path: path.clone(),
+                source,
+            }
         })?;
-        let file = object::File::parse(&*bytes).map_err(|error| ImageError::NotElf {
+        Self::of(path, bytes)
+    }
+
+    /// Checks the bytes of an image, which are those of the file `path`.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn of(path: PathBuf, bytes: Vec<u8>) -> Result<Self, ImageError> {
+        let file = image::parse(&bytes).map_err(|error| ImageError::NotElf {
             path: path.clone(),
             reason: error.to_string(),
         })?;
@@ -157,8 +170,7 @@ fn compiler(file: &object::File<'_>) -> String {
 }
 
 fn sizes(file: &object::File<'_>) -> (u64, u64) {
-    let mut flash = 0;
-    let mut ram = 0;
+    let (mut flash, mut ram) = (0, 0);
     for section in file.sections() {
         let SectionFlags::Elf { sh_flags } = section.flags() else {
             continue;
@@ -169,10 +181,10 @@ fn sizes(file: &object::File<'_>) -> (u64, u64) {
         let in_ram = section.address() >= RAM_START;
         let stored = section.file_range().is_some();
         if in_ram {
-            ram += section.size();
+            ram = section.size().saturating_add(ram);
         }
         if stored {
-            flash += section.size();
+            flash = section.size().saturating_add(flash);
         }
     }
     (flash, ram)

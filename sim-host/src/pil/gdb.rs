@@ -5,7 +5,7 @@
 //! its interrupts; a stop where the core would idle anyway costs nothing. Protocol: the GDB manual, appendix "GDB Remote
 //! Serial Protocol".
 
-use crate::pil::socket::{Socket, SocketError};
+use crate::pil::socket::{LONGEST_LINE, Socket, SocketError};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
@@ -215,12 +215,19 @@ impl Gdb {
 
     /// Receives a packet and takes it.
     fn receive(&mut self) -> Result<String, SocketError> {
-        while self.socket.read_byte()? != b'$' {}
         let mut content = Vec::new();
+        let mut is_inside = false;
+        let mut left = LONGEST_LINE;
         loop {
             match self.socket.read_byte()? {
-                b'#' => break,
-                byte => content.push(byte),
+                b'$' if !is_inside => is_inside = true,
+                b'#' if is_inside => break,
+                byte if is_inside => content.push(byte),
+                _ => {}
+            }
+            left -= 1;
+            if left == 0 {
+                return Err(SocketError::NotUnderstood("a packet without end".into()));
             }
         }
         let digits = [self.socket.read_byte()?, self.socket.read_byte()?];

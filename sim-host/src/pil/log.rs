@@ -1,7 +1,20 @@
 //! The firmware's log: defmt frames on its console, decoded with the image's symbols.
+//!
+//! The console is that of a program which may be any, so nothing that comes over it takes memory without bound.
 
 use crate::pil::elf::Image;
+use anyhow::{bail, ensure};
 use defmt_decoder::{DecodeError, Table};
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Longest frame, bytes; the firmware's have some hundred.
+const FRAME_BYTES: usize = 4096;
+/// Longest line that is shown, characters.
+const LINE_CHARACTERS: usize = 4096;
+/// Lines that are kept, the last ones.
+const LINES: usize = 1000;
+const DAMAGED: &str = "(a damaged log line)";
 
 /// Decodes an image's log.
 pub struct LogDecoder {
@@ -9,33 +22,87 @@ pub struct LogDecoder {
 }
 
 impl LogDecoder {
-    /// The decoder for an image's log. An image without defmt symbols has a log of plain text.
+    /// The decoder for an image's log. An image without defmt symbols has a log that nobody can read.
     ///
     /// # Errors
-    /// If the image's defmt symbols are of a version that this program cannot read.
+    /// If the image's defmt symbols are damaged or of a version or encoding that this program cannot read.
     pub fn new(image: &Image) -> anyhow::Result<Self> {
-        Ok(Self {
-            table: Table::parse(&image.bytes)?,
-        })
+        // Some damage makes the crate panic.
+        let Ok(table) = catch_unwind(|| Table::parse(&image.bytes)) else {
+            bail!("the image's defmt symbols are damaged");
+        };
+        let table = table?.filter(|table| !table.is_empty());
+        if let Some(table) = &table {
+            ensure!(
+                table.encoding().can_recover(),
+                "the image's log has no ends of frames; build it with defmt's encoding rzcobs"
+            );
+        }
+        Ok(Self { table })
     }
 
-    /// Reads the console to its end; `on_line` sees each line of the log.
+    /// Whether the log can be read; not so in an image whose symbols were stripped.
+    pub fn is_readable(&self) -> bool {
+        self.table.is_some()
+    }
+
+    /// Reads the console to its end; `on_line` sees each line of the log, if it can be read.
     pub fn decode(&self, mut console: impl std::io::Read, mut on_line: impl FnMut(&str)) {
         let mut buffer = [0; 4096];
-        let mut decoder = self.table.as_ref().map(Table::new_stream_decoder);
+        let mut frame = Vec::with_capacity(FRAME_BYTES);
+        let mut is_too_long = false;
         while let Ok(length @ 1..) = console.read(&mut buffer) {
-            let Some(decoder) = &mut decoder else {
-                on_line(String::from_utf8_lossy(&buffer[..length]).trim_end());
-                continue;
-            };
-            decoder.received(&buffer[..length]);
-            loop {
-                match decoder.decode() {
-                    Ok(frame) => on_line(&frame.display(false).to_string()),
-                    Err(DecodeError::UnexpectedEof) => break,
-                    Err(DecodeError::Malformed) => on_line("(a damaged log line)"),
+            let Some(table) = &self.table else { continue };
+            for piece in buffer[..length].split_inclusive(|&byte| byte == 0) {
+                is_too_long |= frame.len() + piece.len() > FRAME_BYTES;
+                if !is_too_long {
+                    frame.extend_from_slice(piece);
+                }
+                if piece.ends_with(&[0]) {
+                    match std::mem::take(&mut is_too_long) {
+                        true => on_line(DAMAGED),
+                        false => decode_frame(table, &frame, &mut on_line),
+                    }
+                    frame.clear();
                 }
             }
         }
+    }
+}
+
+/// A frame with its zero; several zeros in a row are the end of one.
+fn decode_frame(table: &Table, frame: &[u8], on_line: &mut impl FnMut(&str)) {
+    // A frame of other symbols can make the crate panic.
+    let line = catch_unwind(AssertUnwindSafe(|| {
+        let mut decoder = table.new_stream_decoder();
+        decoder.received(frame);
+        match decoder.decode() {
+            Ok(frame) => Some(frame.display(false).to_string()),
+            Err(DecodeError::UnexpectedEof) => None,
+            Err(DecodeError::Malformed) => Some(DAMAGED.into()),
+        }
+    }));
+    if let Some(mut line) = line.unwrap_or_else(|_| Some(DAMAGED.into())) {
+        if let Some((end, _)) = line.char_indices().nth(LINE_CHARACTERS) {
+            line.truncate(end);
+        }
+        on_line(&line);
+    }
+}
+
+/// The last lines of a log.
+#[derive(Debug, Default)]
+pub(super) struct Lines(VecDeque<String>);
+
+impl Lines {
+    pub(super) fn push(&mut self, line: &str) {
+        if self.0.len() == LINES {
+            self.0.pop_front();
+        }
+        self.0.push_back(line.into());
+    }
+
+    pub(super) fn into_vec(self) -> Vec<String> {
+        self.0.into()
     }
 }

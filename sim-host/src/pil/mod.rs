@@ -2,6 +2,7 @@
 
 pub mod debug;
 pub mod elf;
+mod emulator;
 pub mod gdb;
 pub mod log;
 pub mod qemu;

@@ -1,20 +1,20 @@
 //! The emulator: starts an image with its settings, shows its log, and ends with it.
 
+use crate::interrupt;
 use crate::pil::elf::Image;
-use crate::pil::log::LogDecoder;
+use crate::pil::emulator::{Emulator, first_words};
+use crate::pil::log::{Lines, LogDecoder};
 pub use crate::pil::socket::SocketError;
-use std::io::Read;
 use std::path::Path;
-use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
-use std::sync::atomic::Ordering;
+use std::process::{Command, ExitStatus, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
 const POLL: Duration = Duration::from_millis(5);
-
-pub use crate::interrupt::REQUESTED as INTERRUPTED;
+/// In the last log line of every image that ends with exit code 0 (`firmware/src/app.rs`).
+const COMPLETE: &str = "run complete";
 
 /// A machine of the emulator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -111,20 +111,41 @@ pub enum RunError {
     #[error("interrupted")]
     Interrupted,
     /// The emulator itself failed.
-    #[error("{PROGRAM} failed ({status}): {message}")]
+    #[error(
+        "{PROGRAM} itself failed ({status}){}",
+        if message.is_empty() { " without a message".into() } else { format!(": {message}") }
+    )]
     EmulatorFailed {
-        /// How it ended.
+        /// How it ended: its exit code, or the signal that ended it.
         status: ExitStatus,
         /// What it said.
         message: String,
     },
+    /// Something ended well that is not the firmware.
+    #[error(
+        "{PROGRAM} ended with exit code 0, but without the firmware's last log line, {COMPLETE:?} (the last one was: \
+         {last_line}); check that the image is one of this firmware and that `{PROGRAM} --version` is QEMU"
+    )]
+    NotComplete {
+        /// What came last.
+        last_line: String,
+    },
+    /// The image has no symbols for its log, without which nobody can say whether its run was complete.
+    #[error(
+        "the image has no defmt symbols, so its log cannot be read; give the ELF that `cargo xtask firmware` builds, not a \
+         stripped one"
+    )]
+    NoLog,
     /// The firmware ended, or closed its link, in the middle of a run.
     #[error(
-        "the firmware left the loop{}; its last log line: {last_line}",
-        exit_code.map(|code| format!(" with exit code {code} ({})", meaning(code))).unwrap_or_default()
+        "the firmware left the loop {}; its last log line: {last_line}",
+        match exit_code {
+            Some(code) => format!("with exit code {code} ({})", meaning(*code)),
+            None => "in a lockup of the core, a fault within the handler of a fault".into(),
+        }
     )]
     LinkLost {
-        /// Its exit code, if it gave one.
+        /// Its exit code; none if the core locked up.
         exit_code: Option<i32>,
         /// What it said last.
         last_line: String,
@@ -140,9 +161,9 @@ pub enum RunError {
 /// A finished run.
 #[derive(Debug, Clone)]
 pub struct Finished {
-    /// The firmware's exit code.
+    /// The firmware's exit code. It is 0 only if the log says that the run is complete, or cannot be read.
     pub exit_code: i32,
-    /// Its log.
+    /// The last lines of its log.
     pub log: Vec<String>,
 }
 
@@ -166,22 +187,12 @@ pub fn meaning(exit_code: i32) -> &'static str {
     }
 }
 
-/// A running emulator, ended when dropped.
-pub(super) struct Emulator(pub(super) Child);
-
-impl Drop for Emulator {
-    fn drop(&mut self) {
-        // Fails only if it has ended already.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
 /// Runs an image with the given settings in `directory`, where its telemetry goes; `on_line` sees its log as it comes.
 ///
 /// # Errors
-/// If the emulator is missing or fails, or the firmware does not end within `limit`. A firmware that ends with an exit code
-/// of its own is a finished run.
+/// If the emulator is missing or fails, or the image has no readable log, or the firmware does not end within `limit`, or
+/// something ends with exit code 0 that has not logged the end of a run. A firmware that ends with an exit code of its own is
+/// a finished run.
 pub fn run(
     image: &Image,
     machine: Machine,
@@ -191,8 +202,29 @@ pub fn run(
     on_line: impl Fn(&str) + Sync,
 ) -> Result<Finished, RunError> {
     let decoder = LogDecoder::new(image).map_err(RunError::Log)?;
+    if !decoder.is_readable() {
+        return Err(RunError::NoLog);
+    }
+    run_with(
+        &decoder, image, machine, settings, directory, limit, on_line,
+    )
+}
+
+/// As [`run`], with a decoder that may be one that cannot read the log; then exit code 0 is all that is known of a run.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_with(
+    decoder: &LogDecoder,
+    image: &Image,
+    machine: Machine,
+    settings: &[String],
+    directory: &Path,
+    limit: Duration,
+    on_line: impl Fn(&str) + Sync,
+) -> Result<Finished, RunError> {
     let emulator = start(image, machine, settings, directory, SILENT)?;
-    attend(emulator, &decoder, limit, on_line)
+    attend(emulator, decoder, limit, on_line)
 }
 
 /// Sees a run to its end.
@@ -202,24 +234,28 @@ pub(super) fn attend(
     limit: Duration,
     on_line: impl Fn(&str) + Sync,
 ) -> Result<Finished, RunError> {
-    let console = emulator.0.stdout.take().expect("stdout is piped");
-    let errors = emulator.0.stderr.take().expect("stderr is piped");
+    let console = emulator.output();
+    let errors = emulator.errors();
     thread::scope(|scope| {
         let log = scope.spawn(|| {
-            let mut lines = Vec::new();
+            let mut lines = Lines::default();
             decoder.decode(console, |line| {
                 on_line(line);
-                lines.push(line.to_owned());
+                lines.push(line);
             });
-            lines
+            lines.into_vec()
         });
-        let errors = scope.spawn(|| read_all(errors));
-        let ended = wait(&mut emulator.0, limit);
+        let errors = scope.spawn(|| first_words(errors));
+        let ended = wait(&mut emulator, limit);
         // Ends the pipes, and with them the two readers.
         drop(emulator);
         let log = log.join().expect("the log's reader does not panic");
         let message = errors.join().expect("the errors' reader does not panic");
-        finish(ended?, log, message, limit)
+        let Some(status) = ended? else {
+            let last_line = last_of(&log);
+            return Err(RunError::TimedOut { limit, last_line });
+        };
+        finish(status, log, message, decoder.is_readable())
     })
 }
 
@@ -257,34 +293,24 @@ pub(super) fn start(
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
-    end_with_parent(&mut command);
-    match command.spawn() {
-        Ok(child) => Ok(Emulator(child)),
+    match Emulator::spawn(&mut command) {
+        Ok(emulator) => Ok(emulator),
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => Err(RunError::NoEmulator),
         Err(error) => Err(RunError::NotStarted(error)),
     }
 }
 
-/// Has the kernel end the emulator should this program be killed, when no destructor runs.
-fn end_with_parent(command: &mut Command) {
-    use std::os::unix::process::CommandExt;
-    // SAFETY: between fork and exec only async-signal-safe calls are allowed, and prctl is one.
-    unsafe {
-        command.pre_exec(|| {
-            let signal = Some(rustix::process::Signal::KILL);
-            Ok(rustix::process::set_parent_process_death_signal(signal)?)
-        });
-    }
-}
-
 /// `None` if the time is over.
-pub(super) fn wait(child: &mut Child, limit: Duration) -> Result<Option<ExitStatus>, RunError> {
+pub(super) fn wait(
+    emulator: &mut Emulator,
+    limit: Duration,
+) -> Result<Option<ExitStatus>, RunError> {
     let start = Instant::now();
     while start.elapsed() < limit {
-        if INTERRUPTED.load(Ordering::Relaxed) {
+        if interrupt::requested() {
             return Err(RunError::Interrupted);
         }
-        if let Some(status) = child.try_wait().map_err(RunError::NotStarted)? {
+        if let Some(status) = emulator.try_wait().map_err(RunError::NotStarted)? {
             return Ok(Some(status));
         }
         thread::sleep(POLL);
@@ -292,29 +318,31 @@ pub(super) fn wait(child: &mut Child, limit: Duration) -> Result<Option<ExitStat
     Ok(None)
 }
 
-fn finish(
-    status: Option<ExitStatus>,
+/// Judges a run whose emulator has ended.
+pub(super) fn finish(
+    status: ExitStatus,
     log: Vec<String>,
     message: String,
-    limit: Duration,
+    is_readable: bool,
 ) -> Result<Finished, RunError> {
-    let Some(status) = status else {
-        let last_line = log.last().cloned().unwrap_or_else(|| "(none)".into());
-        return Err(RunError::TimedOut { limit, last_line });
-    };
+    let exit_code = exit_code(status, message)?;
+    let is_complete = || log.last().is_some_and(|line| line.contains(COMPLETE));
+    if exit_code == 0 && is_readable && !is_complete() {
+        let last_line = last_of(&log);
+        return Err(RunError::NotComplete { last_line });
+    }
+    Ok(Finished { exit_code, log })
+}
+
+/// The firmware's exit code. The emulator's own failures end with 1 and a message, or by a signal; the firmware never ends
+/// with 1.
+pub(super) fn exit_code(status: ExitStatus, message: String) -> Result<i32, RunError> {
     match status.code() {
-        // The emulator's own failures end with 1 and a message; the firmware never ends with 1.
-        Some(exit_code) if exit_code != 1 => Ok(Finished { exit_code, log }),
-        _ => Err(RunError::EmulatorFailed {
-            status,
-            message: message.trim().into(),
-        }),
+        Some(exit_code) if exit_code != 1 => Ok(exit_code),
+        _ => Err(RunError::EmulatorFailed { status, message }),
     }
 }
 
-fn read_all(mut stream: ChildStderr) -> String {
-    let mut bytes = Vec::new();
-    // What could be read before an error is all there is to show.
-    let _ = stream.read_to_end(&mut bytes);
-    String::from_utf8_lossy(&bytes).into_owned()
+fn last_of(log: &[String]) -> String {
+    log.last().cloned().unwrap_or_else(|| "(none)".into())
 }

@@ -1,5 +1,6 @@
 //! A local socket on which the emulator answers, with a time-out on everything.
 
+use crate::interrupt;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::Path;
@@ -7,6 +8,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 const POLL: Duration = Duration::from_millis(2);
+/// Longest answer that is a line, bytes.
+pub(super) const LONGEST_LINE: u64 = 1 << 20;
 
 /// Why the emulator did not do what it was asked for.
 #[derive(Debug, thiserror::Error)]
@@ -44,6 +47,9 @@ impl Socket {
         let stream = loop {
             match UnixStream::connect(path) {
                 Ok(stream) => break stream,
+                Err(_) if interrupt::requested() => {
+                    return Err(SocketError::Lost(std::io::ErrorKind::Interrupted.into()));
+                }
                 Err(error) if start.elapsed() >= limit => return Err(SocketError::Lost(error)),
                 Err(_) => thread::sleep(POLL),
             }
@@ -81,9 +87,11 @@ impl Socket {
 
     pub(super) fn read_line(&mut self) -> Result<String, SocketError> {
         let mut line = String::new();
-        match self.stream.read_line(&mut line) {
+        let mut stream = (&mut self.stream).take(LONGEST_LINE);
+        match stream.read_line(&mut line) {
             Ok(0) => Err(self.why(std::io::ErrorKind::UnexpectedEof.into())),
-            Ok(_) => Ok(line),
+            Ok(_) if line.ends_with('\n') => Ok(line),
+            Ok(_) => Err(SocketError::NotUnderstood("a line without end".into())),
             Err(error) => Err(self.why(error)),
         }
     }

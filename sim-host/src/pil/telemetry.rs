@@ -1,10 +1,13 @@
 //! The firmware's telemetry, read back.
 
+use crate::bounded;
 use crate::trace::Trace;
 use shared_model::Real;
 use shared_model::telemetry::{
     FrameError, HEADER_LEN, Header, Record, TRAILER_LEN, Trailer, is_trailer, record_len,
 };
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// A whole run as the firmware recorded it.
@@ -41,6 +44,18 @@ pub enum TelemetryError {
         /// What is wrong with it.
         error: FrameError,
     },
+    /// A duty code that its timer cannot hold.
+    #[error(
+        "telemetry is wrong at record {record}: duty code {code} of a PWM period of {period} counts"
+    )]
+    Duty {
+        /// The record.
+        record: u32,
+        /// The code.
+        code: u16,
+        /// The period, counts.
+        period: u16,
+    },
     /// A record is missing.
     #[error("telemetry is incomplete: record {found} follows record {last}")]
     Gap {
@@ -71,11 +86,35 @@ impl Recording {
     /// # Errors
     /// If it cannot be read, is cut short, or has a bit changed.
     pub fn open(path: &Path) -> Result<Self, TelemetryError> {
-        let bytes = std::fs::read(path).map_err(|source| TelemetryError::Unreadable {
+        let is_header = |start: &[u8]| Header::decode(start).is_ok();
+        let bytes = bounded::read(path, bounded::RECORDING_BYTES, is_header).map_err(|source| {
+            TelemetryError::Unreadable {
+                path: path.to_path_buf(),
+                source,
+            }
+        })?;
+        Self::decode(&bytes)
+    }
+
+    /// The trailer at the end of a telemetry file, of which no more is read.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or does not end with a trailer.
+    pub fn last_trailer(path: &Path) -> Result<Trailer, TelemetryError> {
+        let read = || {
+            let mut file = File::open(path)?;
+            let length = file.metadata()?.len();
+            let mut bytes = Vec::with_capacity(TRAILER_LEN);
+            file.seek(SeekFrom::Start(length.saturating_sub(TRAILER_LEN as u64)))?;
+            file.take(TRAILER_LEN as u64).read_to_end(&mut bytes)?;
+            Ok((length as usize, bytes))
+        };
+        let (length, bytes) = read().map_err(|source| TelemetryError::Unreadable {
             path: path.to_path_buf(),
             source,
         })?;
-        Self::decode(&bytes)
+        let offset = length.saturating_sub(TRAILER_LEN);
+        Trailer::decode(&bytes).map_err(|error| damaged(offset, "trailer", error))
     }
 
     /// Reads a telemetry stream.
@@ -96,8 +135,16 @@ impl Recording {
             let record = Record::decode(&bytes[offset..], header.samples_per_step, duty)
                 .map_err(|error| damaged(offset, &format!("after record {last}"), error))?;
             let found = record.index;
-            if found != last + 1 {
+            if last.checked_add(1) != Some(found) {
                 gap.get_or_insert(TelemetryError::Gap { last, found });
+            }
+            let of_record = &duties[duties.len() - usize::from(header.samples_per_step)..];
+            if let Some(&code) = of_record.iter().find(|&&code| code > header.pwm_period) {
+                return Err(TelemetryError::Duty {
+                    record: found,
+                    code,
+                    period: header.pwm_period,
+                });
             }
             records.push(record);
             offset += length;

@@ -12,10 +12,12 @@ mod sensitivity;
 mod sweeps;
 
 pub use claims::Judgement;
+#[doc(hidden)]
+pub use piece::Product;
 
 use crate::chaos::sweep::{SweepError, Watch};
 use anyhow::Context;
-use piece::{Piece, Product};
+use piece::Piece;
 use shared_model::Scenario;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};

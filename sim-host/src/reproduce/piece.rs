@@ -4,6 +4,7 @@ use super::claims::Judgement;
 use super::{
     Made, Options, Quality, characteristics, errata, figures, measures, sensitivity, sweeps,
 };
+use crate::bounded;
 use crate::chaos::observe::is_fit;
 use crate::chaos::sweep::Watch;
 use crate::report::chart::Chart;
@@ -205,7 +206,7 @@ pub fn all(options: &Options) -> Vec<Piece> {
 impl Piece {
     /// The piece as an earlier run left it, if it was made of the same.
     pub fn kept(&self, folder: &Path, options: &Options) -> Option<Product> {
-        let text = fs::read_to_string(self.record(folder)).ok()?;
+        let text = bounded::read_text(&self.record(folder), bounded::TEXT_BYTES).ok()?;
         let product: Product = serde_json::from_str(&text).ok()?;
         let same = product.fingerprint == self.fingerprint(options);
         let there = |(name, _): &(String, String)| {

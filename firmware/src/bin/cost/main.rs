@@ -136,7 +136,11 @@ fn run(scenario: &Scenario<f32>) -> ExitCode {
     let model = step_model(scenario, &choice);
     let ecu = run_ecu(scenario, ecu, &choice);
     match (model, ecu) {
-        (Some(true), Some(true)) => ExitCode::Complete,
+        (Some(true), Some(true)) => {
+            // The host takes a run for complete only if it sees these words.
+            defmt::info!("run complete; all bits equal");
+            ExitCode::Complete
+        }
         (Some(_), Some(_)) => ExitCode::Unequal,
         _ => ExitCode::BadScenario,
     }

@@ -8,13 +8,13 @@ use super::tasks::Tasks;
 use crate::closed_loop::drive::{Drive, ecu_scenario};
 use crate::closed_loop::levels::LevelError;
 use crate::closed_loop::manoeuvre::Manoeuvre;
-use crate::pil::qemu::{INTERRUPTED, RunError};
+use crate::interrupt;
+use crate::pil::qemu::RunError;
 use rayon::prelude::*;
 use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::exchange::Packet;
 use std::collections::BTreeMap;
-use std::sync::atomic::Ordering;
 
 /// Time for which a run goes on behind its injection, s.
 pub const WATCHED_S: f64 = 5.0;
@@ -225,7 +225,7 @@ pub fn inject(
         .collect();
     jobs.into_par_iter()
         .map(|(clean, moment, fault)| {
-            if INTERRUPTED.load(Ordering::Relaxed) {
+            if interrupt::requested() {
                 return Err(RunError::Interrupted);
             }
             let outcome = clean.inject(moment, fault);

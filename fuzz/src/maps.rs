@@ -1,0 +1,80 @@
+//! What a map is kept in: tiles, and the Parquet file that a schedule begins with.
+
+use crate::{Target, as_it_is};
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use sim_host::chaos::sweep::Timing;
+use sim_host::map::cell::{Cell, cells};
+use sim_host::map::plan::{Grid, Plan, Sheet, Start};
+use sim_host::map::{table, tiles};
+use std::sync::LazyLock;
+
+/// A tile.
+pub const TILE: Target = Target {
+    name: "tile",
+    read: read_tile,
+    repair: |bytes| {
+        if let Ok(text) = std::str::from_utf8(bytes) {
+            *bytes = tiles::resealed(text).into();
+        }
+    },
+    seeds: || {
+        vec![
+            tiles::text(0, &MAP.0, &MAP.1)
+                .expect("it is written to memory")
+                .into(),
+        ]
+    },
+    // Copies of the text, and a row of CSV as a cell.
+    multiple: 24,
+    mutations: 20_000,
+};
+
+/// A map as Parquet.
+pub const PARQUET: Target = Target {
+    name: "parquet",
+    read: read_parquet,
+    repair: as_it_is,
+    seeds: || vec![parquet()],
+    // Rows that a few bits stand for, as cells.
+    multiple: 4096,
+    mutations: 4_000,
+};
+
+/// A small map.
+static MAP: LazyLock<(Plan, Vec<Cell>)> = LazyLock::new(|| {
+    let grid = |from, to| Grid { from, to, count: 3 };
+    let sheet = |start| Sheet {
+        waveform: Waveform::Square,
+        start,
+        amplitudes_v: grid(0.0, 0.1),
+    };
+    let sheets = [Start::Given, Start::Mirrored].map(sheet).into();
+    let timing = Timing::new(1.0, 3.0).expect("something is observed");
+    let speeds = grid(1600.0, 1700.0);
+    let plan = Plan::new(Scenario::reconstruction(), sheets, speeds, timing).expect("it is a plan");
+    let cells = cells(&plan, &plan.places(0)).expect("it can be made");
+    (plan, cells)
+});
+
+fn read_tile(bytes: &[u8]) {
+    if let Some((plan, cells)) = std::str::from_utf8(bytes)
+        .ok()
+        .and_then(|text| tiles::parsed(text).ok())
+    {
+        assert!(cells.len() <= plan.cells());
+        plan.differences(&MAP.0);
+    }
+}
+
+fn read_parquet(bytes: &[u8]) {
+    if let Ok((plan, cells)) = table::read(bytes::Bytes::copy_from_slice(bytes)) {
+        assert_eq!(cells.len(), plan.cells());
+    }
+}
+
+fn parquet() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    table::write(&MAP.0, &MAP.1, &mut bytes).expect("it is written to memory");
+    bytes
+}
