@@ -20,6 +20,7 @@
 //! | what does a whole verification do? | [`verify`] |
 //! | how are configurations read? | [`config`] |
 //! | how are results shown? | [`report`], [`verdict`] |
+//! | how are files written? | [`output`] |
 
 #[cfg(not(target_os = "linux"))]
 compile_error!(
@@ -35,10 +36,12 @@ pub mod closed_loop;
 pub mod component;
 pub mod config;
 pub mod convergence;
+mod decimal;
 pub mod equivalence;
 pub mod image;
 pub mod instructions;
 pub mod map;
+pub mod output;
 pub mod paper;
 pub mod pil;
 pub mod realisability;
@@ -49,3 +52,4 @@ pub mod simulate;
 pub mod trace;
 pub mod verdict;
 pub mod verify;
+pub mod words;

@@ -1,6 +1,6 @@
 //! `sim-host faults`: faults on purpose, and whether any of them stays unfound.
 
-use super::output::Destinations;
+use super::output::{Destinations, named};
 use super::{Done, time_out};
 use anyhow::Context;
 use clap::Args;
@@ -11,6 +11,7 @@ use sim_host::closed_loop::fault::campaign::{self, Clean, Row, Total, totals};
 use sim_host::closed_loop::fault::catalogue::{self, Class};
 use sim_host::closed_loop::fault::manoeuvres;
 use sim_host::report::fault_matrix;
+use sim_host::words::counted;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -55,7 +56,8 @@ struct Results<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
-    arguments.destinations.check_free()?;
+    let firmware = named("--firmware", &arguments.firmware);
+    arguments.destinations.check(firmware)?;
     let limit = time_out(arguments.time_out)?;
     let mut rows = on_host(arguments.quick)?;
     match &arguments.firmware {
@@ -185,6 +187,9 @@ fn report(rows: &[Row]) {
     let reasons: BTreeSet<_> = rows.iter().filter_map(|row| row.accepted).collect();
     for reason in reasons {
         let of_it = rows.iter().filter(|row| row.accepted == Some(reason));
-        say!("silent and listed, {} times: {reason}", of_it.count());
+        say!(
+            "silent and listed, {}: {reason}",
+            counted(of_it.count(), "time")
+        );
     }
 }

@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         "there is no dither: give --dither square or --dither sine, and --amplitude-v greater than 0"
     );
     let greatest = greatest_angle("--max", arguments.max)?;
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.config.input())?;
     let rows = nonlinearities(&scenario, greatest);
     let results = Results {
         waveform: scenario.dither.waveform,

@@ -12,6 +12,7 @@ use sim_host::chaos::orbit::{Outcome, Point, Section, Start, diagram};
 use sim_host::chaos::sweep::{Parameter, Timing};
 use sim_host::component::Component;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::counted;
 
 /// Orbit diagram (bifurcation diagram): maxima of the yaw rate, or crossings of a section, over wheel speed or dither
 /// amplitude.
@@ -127,7 +128,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         StartOption::Up => (Start::Up, 1),
         StartOption::Down => (Start::Down, 1),
     };
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.config.input())?;
     let announced = &arguments.transient;
     announced.announce(values.count(), timing, &scenario, at_once)?;
     let points = with_progress(values.count(), |watch| {
@@ -185,8 +186,8 @@ fn summary(results: &Results) -> String {
     let misses = count(|o| matches!(o, Outcome::Misses));
     let diverges = count(|o| matches!(o, Outcome::Diverges { .. }));
     format!(
-        "{} values of {}: {met} meet the section, {rests} come to rest, {misses} miss it, {diverges} diverge",
-        results.points.len(),
+        "{} of {}: the section is met at {met}, missed at {misses}; {rests} at rest, {diverges} diverging",
+        counted(results.points.len(), "value"),
         results.parameter.name()
     )
 }

@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         x != y,
         "--x and --y are both {x}: must be different components"
     );
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.input())?;
     let trace = arguments.run.trace(&scenario)?;
     let rows: Vec<Row> = trace
         .states

@@ -9,6 +9,7 @@ use serde::Serialize;
 use sim_host::chaos::poincare::{Crossing, Direction, Section, crossings, range};
 use sim_host::component::Component;
 use sim_host::report::chart::{Chart, Look, Panel};
+use sim_host::words::counted;
 
 /// Poincaré section of the settled motion: its states where one component passes a value.
 #[derive(clap::Args)]
@@ -118,7 +119,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     if let Some(at) = arguments.at {
         ensure!(at.is_finite(), "--at {at}: must be a finite number");
     }
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.input())?;
     let component = arguments.section;
     let value = match arguments.at {
         Some(value) => value,
@@ -160,13 +161,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             Chart {
                 heading: format!("Poincar\u{e9} section \u{2013} {}", title(&scenario)),
                 panels: vec![Panel {
-                    caption: format!("{} crossings of {section:.4}", found.len()),
+                    caption: format!("{} of {section:.4}", counted(found.len(), "crossing")),
                     ..Panel::of_states((x, y), states, Look::Dots)
                 }],
             }
             .svg()
         })?;
-    say!("{} crossings of {section}", found.len());
+    say!("{} of {section}", counted(found.len(), "crossing"));
     if let Some(time_s) = results.mean_return_time_s {
         say!("mean time between them {time_s:.6} s");
     }

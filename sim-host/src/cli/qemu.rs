@@ -1,7 +1,8 @@
 //! `sim-host qemu`: the cargo runner of the firmware.
 
 use super::Done;
-use anyhow::bail;
+use super::output::check;
+use anyhow::{Context, bail, ensure};
 use sim_host::pil::elf::Image;
 use sim_host::pil::qemu::{self, Machine};
 use std::path::{Path, PathBuf};
@@ -25,6 +26,9 @@ pub struct Arguments {
     /// Longest time that the run may take, s
     #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
     time_out: f64,
+    /// Overwrite the telemetry file if it exists
+    #[arg(long)]
+    force: bool,
     /// Firmware image (ELF)
     image: PathBuf,
     /// Settings, `key=value`
@@ -42,6 +46,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     {
         bail!("setting {setting:?}: the firmware takes no blanks in a setting");
     }
+    check_telemetry(arguments)?;
     let show = |line: &str| say!("{line}");
     let finished = qemu::run(
         &image,
@@ -61,4 +66,25 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     Ok(Done::Code(
         u8::try_from(code).unwrap_or(super::COULD_NOT_RUN),
     ))
+}
+
+/// The firmware overwrites what is there without asking, so it is asked here.
+fn check_telemetry(arguments: &Arguments) -> anyhow::Result<()> {
+    let settings = arguments.settings.iter();
+    let file = settings.filter_map(|setting| setting.strip_prefix("telemetry="));
+    // The last of several counts.
+    if let Some(file) = file.last() {
+        let image = ("the image", arguments.image.as_path());
+        let outputs = check(
+            [image],
+            [Some(("telemetry", Path::new(file)))],
+            arguments.force,
+        )
+        .context("nothing was run; --force goes before the image")?;
+        ensure!(
+            !outputs.data_on_stdout() && !file.starts_with(':'),
+            "telemetry={file}: it would get among the log; give the name of a file"
+        );
+    }
+    Ok(())
 }

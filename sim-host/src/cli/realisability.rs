@@ -7,6 +7,7 @@ use serde::Serialize;
 use shared_model::dither::Waveform;
 use sim_host::config::validate;
 use sim_host::realisability::{Amplitudes, Demand, Response, bode_chart, demands, responses};
+use sim_host::words::Short;
 
 /// What the steering actuator passes of the dither (Bode diagram), the torque that the dither's amplitude would need, and the
 /// amplitude that the motor reaches, from 1 to 20,000 rad/s.
@@ -53,7 +54,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     ] {
         ensure!(
             volts > 0.0 && volts <= 1000.0,
-            "{option} {volts}: must be greater than 0 and at most 1000 V"
+            "{option} {}: must be greater than 0 and at most 1000 V",
+            Short(volts)
         );
     }
     let amplitudes = Amplitudes::from_volts(&scenario, arguments.square_v, arguments.sine_v);
@@ -63,7 +65,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         scenario.dither.square_rad_per_volt,
         scenario.dither.sine_rad_per_volt
     );
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.config.input())?;
     let rows = responses(&scenario, &amplitudes);
     let results = Results {
         demands: demands(&scenario, &amplitudes),

@@ -11,6 +11,7 @@ use shared_model::Scenario;
 use sim_host::chaos::regions::{Regions, Sample, coexisting, regions};
 use sim_host::chaos::sweep::{Parameter, Timing, mirrored};
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::{Short, counted};
 
 /// Kinds of motion (equilibrium, period-n, chaos) over wheel speed or dither amplitude, with each edge between them bisected.
 ///
@@ -84,10 +85,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let width = arguments.width.unwrap_or(parameter.edge_width());
     ensure!(
         width >= LEAST_WIDTH && width.is_finite(),
-        "--width {width}: must be a finite number of at least {LEAST_WIDTH} {}",
+        "--width {}: must be a finite number of at least {LEAST_WIDTH} {}",
+        Short(width),
         parameter.unit()
     );
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.config.input())?;
     let runs = 2 * values.count();
     let announced = &arguments.transient;
     announced.announce(runs, timing, &scenario, side_by_side())?;
@@ -176,8 +178,8 @@ fn show(results: &Results) {
     let at = &results.coexisting_at;
     match (at.first(), at.last()) {
         (Some(first), Some(last)) => say!(
-            "two attractors coexist at {} values from {first} to {last} {unit}",
-            at.len()
+            "two attractors coexist at {} from {first} to {last} {unit}",
+            counted(at.len(), "value")
         ),
         _ => say!("both starts end on the same attractor at every value"),
     }

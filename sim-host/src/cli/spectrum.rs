@@ -10,6 +10,7 @@ use shared_model::dither::{Application, Waveform};
 use sim_host::chaos::power_spectrum::{MIN_SEGMENT, PowerSpectrum, welch};
 use sim_host::component::Component;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::{Short, counted};
 use std::f64::consts::TAU;
 
 /// Segments of half overlap that a run has by default.
@@ -77,7 +78,8 @@ impl Arguments {
         let least_s = MIN_SEGMENT as f64 / rate_hz;
         ensure!(
             length_s >= least_s && length_s <= duration_s,
-            "--segment {length_s}: must be from {least_s} s ({MIN_SEGMENT} samples) to the run's length, --time {duration_s} s"
+            "--segment {}: must be from {least_s} s ({MIN_SEGMENT} samples) to the run's length, --time {duration_s} s",
+            Short(length_s)
         );
         Ok(((length_s * rate_hz).round() as usize).min(scenario.steps() as usize))
     }
@@ -91,7 +93,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         scenario.validate()?;
     }
     let segment = arguments.segment(&scenario)?;
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.input())?;
     let trace = arguments.run.trace(&scenario)?;
     let component = arguments.component;
     let (low, high) = trace.range(component.index, 0);
@@ -107,8 +109,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         .destinations
         .write(&results.bins, &results, || chart(&scenario, &results).svg())?;
     say!(
-        "{} segments, bins of {:.4} Hz; power {:.6e} ({})\u{b2}, greatest at {:.4} Hz",
-        results.segments,
+        "{}, bins of {:.4} Hz; power {:.6e} ({})\u{b2}, greatest at {:.4} Hz",
+        counted(results.segments, "segment"),
         results.bin_hz,
         results.power,
         component.unit,
@@ -186,8 +188,9 @@ fn chart(scenario: &Scenario<f64>, results: &Results) -> Chart {
     let unit = results.component.unit;
     let panel = Panel {
         caption: format!(
-            "{} segments, Hann window, half overlap; bins of {:.3} Hz, the greatest in each drawn interval",
-            results.segments, results.bin_hz
+            "{}, Hann window, half overlap; bins of {:.3} Hz, the greatest in each drawn interval",
+            counted(results.segments, "segment"),
+            results.bin_hz
         ),
         x: AxisSpec::logarithmic("frequency (Hz)").from_to(ends.0, ends.1),
         y: AxisSpec::logarithmic(format!("density (({unit})\u{b2}/Hz)")),

@@ -6,7 +6,7 @@
 use super::cell::{Cell, cells};
 use super::plan::{Place, Plan};
 use crate::chaos::sweep::Watch;
-use crate::report::file::replace;
+use crate::output::{make_folder, write_text};
 use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -64,7 +64,7 @@ impl<'a> Folder<'a> {
     /// # Errors
     /// If it cannot be made, or holds a tile of another plan.
     pub fn make(path: &Path, plan: &'a Plan) -> anyhow::Result<Self> {
-        fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))?;
+        make_folder(path)?;
         Self::open(path, plan)
     }
 
@@ -118,7 +118,7 @@ impl<'a> Folder<'a> {
             csv.serialize(cell)?;
         }
         let rows = String::from_utf8(csv.into_inner()?)?;
-        replace(&self.file(tile), &format!("{header}\n{rows}"))
+        write_text(&self.file(tile), &format!("{header}\n{rows}"), true)
     }
 
     fn read(&self, tile: usize) -> anyhow::Result<Vec<Cell>> {

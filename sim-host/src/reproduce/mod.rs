@@ -12,6 +12,7 @@ mod sensitivity;
 mod sweeps;
 
 pub use claims::Judgement;
+pub use page::CLAIMS;
 
 use crate::chaos::sweep::{SweepError, Watch};
 use anyhow::Context;
