@@ -229,6 +229,9 @@ mod tests {
             Err(NotSpaced::TooFarApart)
         );
         assert_eq!(Spaced::between(1.0, 1.0, 2), Err(NotSpaced::TooClose));
-        assert!(Spaced::between(0.0, 1.0, usize::MAX).is_ok());
+        assert_eq!(
+            Spaced::between(0.0, 1.0, usize::MAX),
+            Err(NotSpaced::TooClose)
+        );
     }
 }

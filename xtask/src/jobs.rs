@@ -5,6 +5,7 @@ pub mod demo;
 pub mod firmware;
 pub mod lint;
 pub mod mutants;
+pub mod package;
 pub mod proofs;
 pub mod setup;
 pub mod target_cost;

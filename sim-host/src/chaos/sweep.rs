@@ -134,9 +134,15 @@ pub enum SweepError {
     Scenario(#[from] InvalidScenario),
 }
 
-/// Equally spaced values, each the double nearest to its decimal value.
+/// Equally spaced values, each the double nearest to its decimal value; but for those by [`parts`](Self::parts).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Values(Spaced);
+pub struct Values(Kind);
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Decimal(Spaced),
+    Multiples { of: f64, count: usize },
+}
 
 impl Values {
     /// The values from `from` on in steps of `step`, not beyond `to`, which may be the lower one; `what` they are of is for the
@@ -162,7 +168,7 @@ impl Values {
             return refuse("the step must be greater than 0; only downwards it may be less");
         }
         match Spaced::in_steps(from, to, step, MAX_VALUES) {
-            Ok(values) => Ok(Self(values)),
+            Ok(values) => Ok(Self(Kind::Decimal(values))),
             Err(fault) => refuse(words(fault)),
         }
     }
@@ -189,23 +195,52 @@ impl Values {
         if !from.is_finite() || !to.is_finite() {
             return refuse("both must be finite numbers");
         }
-        if count == 0 || count == 1 && from != to {
+        if count == 0 || (count == 1) != (from == to) {
             return refuse("there must be at least two, or one with both ends the same");
         }
         match Spaced::between(from, to, count) {
-            Ok(values) => Ok(Self(values)),
+            Ok(values) => Ok(Self(Kind::Decimal(values))),
             Err(fault) => refuse(words(fault)),
         }
     }
 
+    /// The ends of `parts` equal parts from 0 to `to`, as multiples of the double that is nearest to one: the ECU's table is made
+    /// from these, and depends on their last bits.
+    ///
+    /// # Errors
+    /// If `to` is not a positive number, or there is no part.
+    pub fn parts(what: &'static str, to: f64, parts: usize) -> Result<Self, SweepError> {
+        let count = parts.saturating_add(1);
+        Self::between(what, 0.0, to, count)?;
+        if to < 0.0 {
+            return Err(SweepError::Count {
+                what,
+                from: 0.0,
+                to,
+                count,
+                fault: "the second must be greater than 0",
+            });
+        }
+        Ok(Self(Kind::Multiples {
+            of: to / parts as f64,
+            count,
+        }))
+    }
+
     /// How many there are.
     pub fn count(&self) -> usize {
-        self.0.count()
+        match &self.0 {
+            Kind::Decimal(values) => values.count(),
+            Kind::Multiples { count, .. } => *count,
+        }
     }
 
     /// Value number `k` of the ascending ones, from 0 on.
     pub fn at(&self, k: usize) -> f64 {
-        self.0.at(k)
+        match &self.0 {
+            Kind::Decimal(values) => values.at(k),
+            Kind::Multiples { of, .. } => k as f64 * of,
+        }
     }
 
     /// The least.

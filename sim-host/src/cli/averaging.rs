@@ -14,7 +14,8 @@ use sim_host::words::Short;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host averaging --dither square --amplitude-v 0.1
-  sim-host averaging --dither sine --amplitude-v 1 --from 200 --to 20000 --points 30 --figure averaging.svg")]
+  sim-host averaging --dither sine --amplitude-v 1 --from 500 --to 20000 \\
+      --points 9 --figure averaging.svg")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,

@@ -16,7 +16,8 @@ use sim_host::words::counted;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host basin --rpm 1750 --out basin.csv --figure basin.svg
-  sim-host basin --rpm 1600 --beta-from -0.4 --beta-to 0.4 --beta-step 0.02 --delta-step 0.02 --json basin.json")]
+  sim-host basin --rpm 1600 --beta-from -0.4 --beta-to 0.4 --beta-step 0.02 \\
+      --delta-step 0.02 --json basin.json")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,

@@ -13,7 +13,7 @@ use sim_host::words::Short;
 /// grows: compare over a few seconds.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host convergence                              the paper's vehicle over 4 s, friction events included
+  sim-host convergence                  # over 4 s, friction events included
   sim-host convergence --dither sine --amplitude-v 1 --figure convergence.svg")]
 pub struct Arguments {
     #[command(flatten)]

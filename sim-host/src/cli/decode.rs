@@ -9,9 +9,10 @@ use std::path::PathBuf;
 
 /// Check a telemetry file of the firmware, say how its run ended, and write its motion as CSV.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
-  (cd firmware && cargo run -- telemetry=run.bin run.duration_s=5)
-  sim-host decode firmware/run.bin --out run.csv")]
+#[command(after_help = "Examples:
+  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+      telemetry=decode.bin run.duration_s=5
+  sim-host decode decode.bin --out decode.csv")]
 pub struct Arguments {
     /// Telemetry file
     telemetry: PathBuf,

@@ -19,9 +19,9 @@ use sim_host::words::{counted, counted_as};
 /// held.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host equilibria --rpm 1750                                          all equilibria of the paper's vehicle
-  sim-host equilibria --from 1000 --to 2000 --step 10 --figure hopf.svg   over speed, with Hopf bifurcations
-  sim-host equilibria --rpm 1750 --dither square --amplitude-v 0.1 --json equilibria.json")]
+  sim-host equilibria --rpm 1750        # all of the paper's vehicle
+  sim-host equilibria --from 1000 --to 2000 --step 10 --figure hopf.svg
+  sim-host equilibria --dither square --amplitude-v 0.1 --json equilibria.json")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,

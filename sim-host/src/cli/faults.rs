@@ -34,7 +34,8 @@ const MOST_NAMED: usize = 20;
 #[derive(Args)]
 #[command(after_help = "Examples:
   sim-host faults --quick
-  sim-host faults --firmware target/thumbv7em-none-eabihf/firmware/ecu --out faults.csv --json faults.json --figure faults.svg")]
+  sim-host faults --firmware target/thumbv7em-none-eabihf/firmware/ecu \\
+      --out faults.csv --json faults.json --figure faults.svg")]
 pub struct Arguments {
     /// One moment of injection a manoeuvre, and few bits
     #[arg(long)]

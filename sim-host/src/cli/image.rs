@@ -14,9 +14,10 @@ use std::path::PathBuf;
 /// The image has to be compiled with `-Zemit-stack-sizes`, as `cargo xtask proofs` does. The stack's figure is a bound:
 /// main program, control task, PWM interrupt, hard fault and watchdog each at their deepest, one on top of the other.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   cargo xtask proofs
-  sim-host image target/stack-sizes/thumbv7em-none-eabihf/firmware/ecu --json stack.json
+  sim-host image --json stack.json \\
+      target/stack-sizes/mps2/thumbv7em-none-eabihf/firmware/ecu
 
 Exit code 1 if there is no bound (recursion, unknown frames), or less RAM than it takes.")]
 pub struct Arguments {

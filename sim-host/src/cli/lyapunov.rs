@@ -23,11 +23,12 @@ use std::time::{Duration, Instant};
 /// nothing are named in the results. Ctrl-C stops behind the points in work and writes what is done.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host lyapunov --rpm 1750 --method all          three methods side by side
-  sim-host lyapunov --rpm 1750 --spectrum            all four exponents
-  sim-host lyapunov --from 1500 --to 1950 --step 5 --out exponents.csv --figure exponents.svg
+  sim-host lyapunov --rpm 1750 --method all     # three methods side by side
+  sim-host lyapunov --rpm 1750 --spectrum       # all four exponents
+  sim-host lyapunov --from 1500 --to 1950 --step 5 \\
+      --out exponents.csv --figure exponents.svg
   sim-host lyapunov --rpm 1750 --dither square --amplitude-v 0.1
-  sim-host lyapunov --rpm 1600 --method printed-response         equation (20) to the letter")]
+  sim-host lyapunov --rpm 1600 --method printed-response    # equation (20)")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,

@@ -29,11 +29,14 @@ use std::path::PathBuf;
 #[command(
     args_conflicts_with_subcommands = true,
     after_help = "Examples:
-  sim-host map --out map.csv --parquet map.parquet --figure map.svg
-  sim-host map --dither square --from 1700 --to 1800 --square-to 0.1 --speeds 64 --amplitudes 64 --figure detail.svg
-  sim-host map --shard 1/2 --work one       on one machine, and on another
-  sim-host map --shard 2/2 --work two
-  sim-host map merge one two --out map.csv  then puts both together"
+  sim-host map --speeds 64 --amplitudes 64 \\
+      --out map.csv --parquet map.parquet --figure map.svg
+  sim-host map --dither square --from 1700 --to 1800 --step 2 \\
+      --square-to 0.1 --square-step 0.002 --figure map-detail.svg
+  # on two machines; then both together
+  sim-host map --speeds 16 --amplitudes 16 --shard 1/2 --work one
+  sim-host map --speeds 16 --amplitudes 16 --shard 2/2 --work two
+  sim-host map merge one two --out map-merged.csv"
 )]
 pub struct Arguments {
     #[command(subcommand)]

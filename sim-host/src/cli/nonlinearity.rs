@@ -15,7 +15,8 @@ use sim_host::config::validate;
 #[command(after_help = "Examples:
   sim-host nonlinearity --dither square --amplitude-v 0.1 --figure figs9-11.svg
   sim-host nonlinearity --dither sine --amplitude-v 1 --figure figs14-16.svg
-  sim-host nonlinearity --dither sine --amplitude-v 1 --max 0.2 --out n.csv")]
+  sim-host nonlinearity --dither sine --amplitude-v 1 --max 0.2 \\
+      --out nonlinearity.csv")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,

@@ -21,10 +21,14 @@ use sim_host::words::counted;
 /// dither is averaged and on from the start. Motions that diverge are named as such and have no values.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host orbit --from 1600 --to 1900 --step 1 --out orbit.csv --figure orbit.svg      the paper's Figure 6
-  sim-host orbit --over amplitude --dither square --rpm 1750 --figure square.svg        Figure 8
-  sim-host orbit --over amplitude --dither sine --from 0 --to 1.4 --step 0.005 --figure sine.svg
-  sim-host orbit --start down --section steering-rate --level 0 --out down.csv")]
+  sim-host orbit --from 1600 --to 1900 --step 1 \\
+      --out orbit.csv --figure orbit.svg    # the paper's Figure 6
+  sim-host orbit --over amplitude --dither square --rpm 1750 \\
+      --figure orbit-square.svg             # Figure 8
+  sim-host orbit --over amplitude --dither sine --from 0 --to 1.4 --step 0.005 \\
+      --figure orbit-sine.svg
+  sim-host orbit --start down --section steering-rate --level 0 \\
+      --out orbit-down.csv")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,

@@ -33,12 +33,13 @@ use std::path::{Path, PathBuf};
     mut_arg("figure", |arg| arg.help("Draw the manoeuvre as an SVG figure"))
 )]
 #[command(after_help = "Examples:
-  sim-host pil                                            1750 rpm, square dither from 3 s
+  sim-host pil              # 1750 rpm, square dither from 3 s
   sim-host pil --rpm 1880 --dither sine --figure pil.svg
-  sim-host pil --scenario examples/manoeuvres/speed-ramp.toml --record ramp.loop --out ramp.csv
-  sim-host pil --replay ramp.loop                         the same again without QEMU
-  sim-host pil --scenario examples/manoeuvres/*.toml      a table over all of them
-  sim-host pil --link uart --time 1                       over the board's UART: realistic, and slow")]
+  sim-host pil --scenario examples/manoeuvres/speed-ramp.toml \\
+      --record ramp.loop --out ramp.csv
+  sim-host pil --replay ramp.loop       # the same again without QEMU
+  sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
+  sim-host pil --link uart --time 1     # the board's UART: realistic, slow")]
 pub struct Arguments {
     /// Manoeuvres, as TOML files [default: constant speed of 1750 rpm, square dither from 3 s, 20 s]
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -78,7 +79,7 @@ pub struct Arguments {
     time_out: f64,
 }
 
-const USUAL: &str = include_str!("../../../examples/manoeuvres/constant-speed.toml");
+const USUAL: &str = include_str!("../../examples/manoeuvres/constant-speed.toml");
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     if let Some(file) = &arguments.replay {

@@ -15,8 +15,10 @@ use sim_host::words::counted;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host poincare --rpm 1750 --time 2000 --figure poincare.svg
-  sim-host poincare --rpm 1840 --section yaw_rate --at 0 --direction rising --out period3.csv
-  sim-host poincare --section sideslip --x yaw_rate --y steering_rate --time 500 --figure section.svg
+  sim-host poincare --rpm 1840 --section yaw_rate --at 0 --direction rising \\
+      --out period3.csv
+  sim-host poincare --section sideslip --x yaw_rate --y steering_rate \\
+      --time 500 --figure section.svg
 
 Components: sideslip (beta), yaw_rate (gamma), steering_angle (delta_f), steering_rate (delta_f_dot).")]
 pub struct Arguments {

@@ -10,10 +10,13 @@ use std::path::{Path, PathBuf};
 /// Run a firmware image in QEMU: show its log, pass its exit code on, and end with it.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples (cargo runs this from firmware/, so `cargo run -- SETTINGS` is the short form):
-  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu run.wheel_speed_rpm=1600
-  sim-host qemu ecu dither.waveform=sine dither.amplitude_v=1 telemetry=run.bin
-  sim-host qemu --machine mps2-an500 --time-out 60 ecu run.duration_s=5
+    after_help = "Examples (cargo runs this from firmware/: `cargo run -- SETTINGS`):
+  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+      run.wheel_speed_rpm=1600
+  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+      dither.waveform=sine dither.amplitude_v=1 telemetry=run.bin
+  sim-host qemu --machine mps2-an500 --time-out 60 \\
+      target/thumbv7em-none-eabihf/firmware/ecu run.duration_s=5
 
 Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME and telemetry=FILE.
 Exit codes are the firmware's: 0 complete, 10 scenario refused, 11 telemetry, 12 overrun, 13 panic, 14 hard fault, 15

@@ -14,7 +14,9 @@ use sim_host::words::Short;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host realisability --figure bode.svg
-  sim-host realisability --square-v 0.05 --sine-v 0.8 --out actuator.csv --json actuator.json
+  sim-host realisability --square-v 0.05 --sine-v 0.8 \\
+      --out actuator.csv --json actuator.json
+  sim-host config > vehicle.toml
   sim-host realisability --config vehicle.toml")]
 pub struct Arguments {
     #[command(flatten)]

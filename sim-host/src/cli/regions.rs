@@ -21,9 +21,12 @@ use sim_host::words::{Short, counted};
 /// steering angle; attractors that coexist are named.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host regions --from 1600 --to 1900 --step 5 --figure regions.svg        the paper's regions I to IV
-  sim-host regions --from 1820 --to 1860 --step 1 --width 0.1 --transient 1000 --time 2000 --json regions.json
-  sim-host regions --over amplitude --dither square --from 0 --to 0.14 --step 0.002 --out square.csv")]
+  sim-host regions --from 1600 --to 1900 --step 5 \\
+      --figure regions.svg                  # the paper's regions I to IV
+  sim-host regions --from 1820 --to 1860 --step 1 --width 0.1 \\
+      --transient 1000 --time 2000 --json regions.json
+  sim-host regions --over amplitude --dither square \\
+      --from 0 --to 0.14 --step 0.002 --out regions-square.csv")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,

@@ -17,8 +17,9 @@ use std::time::{Duration, Instant};
 /// judged instead of the presets.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host reproduce --quick                        a look at everything in seconds
-  sim-host reproduce                                full quality, in target/reproduction
+  sim-host reproduce --quick    # everything in seconds
+  sim-host reproduce            # full quality, in target/reproduction
+  sim-host config > vehicle.toml
   sim-host reproduce --config vehicle.toml --out target/vehicle")]
 pub struct Arguments {
     /// Coarse sweeps and short runs

@@ -33,22 +33,30 @@ use std::path::{Path, PathBuf};
 #[command(
     mut_arg("step", |arg| arg.default_value("25")),
     mut_arg("square_to", |arg| arg.default_value("0.15")),
-    mut_arg("square_step", |arg| arg.default_value("0.005")),
     mut_arg("sine_to", |arg| arg.default_value("1.35")),
-    mut_arg("sine_step", |arg| arg.default_value("0.045")),
     mut_arg("transient", |arg| arg.default_value("150"))
 )]
 #[command(after_help = "Examples:
-  sim-host schedule --figure schedule.svg --csv map.csv
-  sim-host schedule --config heavier.toml --from 1400 --step 50 --margin 0.5 --json schedule.json
-  sim-host map --start both --speeds 41 --amplitudes 31 --square-to 0.15 --sine-to 1.35 --transient 150 --parquet map.parquet
-  sim-host schedule --map map.parquet        the same schedule from that map
-  sim-host schedule --out shared-model/src/schedule_table.rs --force       the table of the ECU, then build the firmware")]
+  sim-host schedule --from 1700 --to 1800 \\
+      --csv schedule.csv --figure schedule.svg
+  sim-host config > vehicle.toml
+  sim-host schedule --config vehicle.toml --from 1500 --to 1600 --step 50 \\
+      --margin 0.5 --json schedule.json
+  # the cells of the grid from a map
+  sim-host map --start both --from 1700 --to 1800 --step 25 --square-to 0.15 \\
+      --sine-to 1.35 --amplitudes 31 --transient 150 --parquet known.parquet
+  sim-host schedule --from 1700 --to 1800 --map known.parquet
+  # the ECU's table, for shared-model/src; then build the firmware
+  sim-host schedule --out schedule_table.rs")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,
     #[command(flatten)]
     grid: GridOptions,
+    /// Equal steps from 0 to the greatest amplitude, instead of --square-step and --sine-step; edges are bisected to a sixteenth of
+    /// a step
+    #[arg(long, value_name = "COUNT", default_value_t = 30, conflicts_with_all = ["square_step", "sine_step"], value_parser = clap::value_parser!(u32).range(2..=1000))]
+    amplitudes: u32,
     /// How far above the least amplitude an entry lies, as a share of its range from 0 to 1; at least half a PWM count
     #[arg(
         long,
@@ -157,23 +165,23 @@ impl Arguments {
             Short(self.margin)
         );
         let (what, to_v, step_v) = self.grid.amplitudes_v(waveform);
-        let (step_rpm, step_v) = (
-            self.grid.step.unwrap_or_default(),
-            step_v.unwrap_or_default(),
-        );
-        let (from, to) = (self.grid.from, self.grid.to);
-        let amplitudes_v = Values::new(what, 0.0, to_v, step_v)?;
+        let amplitudes_v = match step_v {
+            Some(step_v) => Values::new(what, 0.0, to_v, step_v)?,
+            None => Values::parts(what, to_v, self.amplitudes as usize)?,
+        };
+        let step_v = step_v.unwrap_or(to_v / f64::from(self.amplitudes));
         ensure!(
-            AMPLITUDES.contains(&amplitudes_v.count()),
-            "{what}: {} from 0 to {} in steps of {}: must be {} to {}",
+            AMPLITUDES.contains(&amplitudes_v.count()) && to_v > 0.0,
+            "{what}: {} from 0 to {} in steps of {}: must be {} to {}, ascending",
             counted(amplitudes_v.count(), "value"),
             Short(to_v),
             Short(step_v),
             AMPLITUDES.start(),
             AMPLITUDES.end()
         );
+        let (from, to) = (self.grid.from, self.grid.to);
         let plan = Plan {
-            speeds_rpm: Values::new("wheel speed (rpm)", from, to, step_rpm)?,
+            speeds_rpm: Values::new("wheel speed (rpm)", from, to, self.step_rpm())?,
             amplitudes_v,
             edge_width_v: EDGE_SHARE * step_v,
             margin: self.margin,
@@ -225,31 +233,36 @@ impl Arguments {
         format!(
             "sim-host map{} --start both {} {} --parquet {}",
             self.config.words(),
-            self.axes().join(" "),
+            self.axes(self.amplitudes + 1),
             self.times(),
             path.display()
         )
     }
 
-    /// The options of the axes, the speed's and the amplitudes'.
-    fn axes(&self) -> [String; 2] {
+    fn step_rpm(&self) -> f64 {
+        self.grid.step.expect("it has a default")
+    }
+
+    /// The options of the axes, amplitudes by their number or their steps.
+    fn axes(&self, amplitudes: u32) -> String {
         let grid = &self.grid;
-        let step = |step: Option<f64>| step.unwrap_or_default();
-        [
-            format!(
-                "--from {} --to {} --step {}",
-                grid.from,
-                grid.to,
-                step(grid.step)
-            ),
-            format!(
-                "--square-to {} --square-step {} --sine-to {} --sine-step {}",
-                grid.square_to,
-                step(grid.square_step),
-                grid.sine_to,
-                step(grid.sine_step)
-            ),
-        ]
+        let step = |option, step: Option<f64>| step.map(|step| format!(" --{option} {step}"));
+        let steps = [
+            step("square-step", grid.square_step),
+            step("sine-step", grid.sine_step),
+        ];
+        let amplitudes = match steps {
+            [None, None] => format!(" --amplitudes {amplitudes}"),
+            steps => steps.into_iter().flatten().collect(),
+        };
+        format!(
+            "--from {} --to {} --step {} --square-to {} --sine-to {}{amplitudes}",
+            grid.from,
+            grid.to,
+            self.step_rpm(),
+            grid.square_to,
+            grid.sine_to
+        )
     }
 
     fn times(&self) -> String {
@@ -289,7 +302,7 @@ impl Arguments {
             _ => format!("the paper's but for {}", differences.join(", ")),
         };
         vec![
-            format!("Made by `sim-host schedule {}", self.axes().join(" ")),
+            format!("Made by `sim-host schedule {}", self.axes(self.amplitudes)),
             format!(
                 "--margin {} {} --out FILE`; not to be edited by hand. Parameters: {parameters}.",
                 self.margin,

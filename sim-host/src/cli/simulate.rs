@@ -12,9 +12,11 @@ use std::path::PathBuf;
 /// Run a scenario on the host and write its motion as CSV.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host simulate --rpm 1750 --time 20 --out chaos.csv
-  sim-host simulate --rpm 1750 --dither square --amplitude-v 0.1 --time 20 --out trace.csv
-  sim-host simulate --config vehicle.toml --f32 --out trace.csv")]
+  sim-host simulate --rpm 1750 --time 20 --out simulate.csv
+  sim-host simulate --rpm 1750 --dither square --amplitude-v 0.1 --time 20 \\
+      --out simulate-square.csv
+  sim-host config > vehicle.toml
+  sim-host simulate --config vehicle.toml --f32 --out simulate-f32.csv")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,

@@ -23,9 +23,11 @@ const INTERVALS: f64 = 700.0;
 /// The dither, if there is one, is applied as the true signal, so that its line shows.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host spectrum --rpm 1750 --time 200 --figure chaos.svg
-  sim-host spectrum --rpm 1750 --dither square --amplitude-v 0.1 --time 60 --figure dither.svg
-  sim-host spectrum --component steering_angle --segment 20 --time 400 --out spectrum.csv
+  sim-host spectrum --rpm 1750 --time 200 --figure spectrum.svg
+  sim-host spectrum --rpm 1750 --dither square --amplitude-v 0.1 --time 60 \\
+      --figure spectrum-dither.svg
+  sim-host spectrum --component steering_angle --segment 20 --time 400 \\
+      --out spectrum.csv
 
 Components: sideslip (beta), yaw_rate (gamma), steering_angle (delta_f), steering_rate (delta_f_dot).")]
 pub struct Arguments {

@@ -14,6 +14,7 @@ use sim_host::words::Short;
 #[command(after_help = "Examples:
   sim-host tires --figure fig2.svg
   sim-host tires --slip-max 0.5 --out tires.csv --json tires.json
+  sim-host config > vehicle.toml
   sim-host tires --config vehicle.toml --figure tires.svg")]
 pub struct Arguments {
     #[command(flatten)]

@@ -23,8 +23,9 @@ use std::time::{Duration, Instant};
 /// figures.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host verify                                   the paper's vehicle; report in target/report
-  sim-host verify --force --duration-s 120          longer runs, over the last report
+  sim-host verify           # the paper's vehicle; report in target/report
+  sim-host verify --force --duration-s 120  # longer, over the last report
+  sim-host config > vehicle.toml
   sim-host verify --config vehicle.toml --out report/vehicle")]
 pub struct Arguments {
     #[command(flatten)]
