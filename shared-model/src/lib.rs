@@ -23,6 +23,7 @@ pub mod schedule_table;
 pub mod serial;
 pub mod servo;
 pub mod settings;
+pub mod short;
 pub mod signal;
 pub mod stability;
 pub mod steering;

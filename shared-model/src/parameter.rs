@@ -1,6 +1,7 @@
 //! Parameter sets: each number's name, range and place, written once, and the checks that follow from them.
 
 use crate::Real;
+use crate::short::Short;
 use core::fmt;
 
 /// One number of a parameter set `P`: its name (which carries the unit), its allowed range, and where it is.
@@ -92,7 +93,11 @@ impl fmt::Display for OutOfRange {
         write!(
             f,
             "{}.{} = {}: must be a finite number from {} to {}",
-            self.section, self.name, self.value, self.min, self.max
+            self.section,
+            self.name,
+            Short(self.value),
+            Short(self.min),
+            Short(self.max)
         )
     }
 }

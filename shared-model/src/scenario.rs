@@ -7,6 +7,7 @@ use crate::friction::{Friction, FrictionLaw};
 use crate::gate::Limits;
 use crate::parameter::{Field, OutOfRange, ParameterSet};
 use crate::servo::Servo;
+use crate::short::Short;
 use crate::stability::{MOST_STEP_TIMES_RATE, fastest_rate_per_s, least_rate_hz};
 use crate::steering::Steering;
 use crate::tire::{LOW_FRICTION_ROAD, MagicFormula, TireModel};
@@ -473,8 +474,10 @@ impl fmt::Display for InvalidScenario {
             Self::OutOfRange(ref error) => error.fmt(f),
             Self::Rates { control_hz, pwm_hz } => write!(
                 f,
-                "run.pwm_rate_hz = {pwm_hz} and run.control_rate_hz = {control_hz}: both must be whole numbers, the first a \
-                 multiple of the second, at most {MAX_RATIO} times it"
+                "run.pwm_rate_hz = {} and run.control_rate_hz = {}: both must be whole numbers, the first a multiple of the \
+                 second, at most {MAX_RATIO} times it",
+                Short(pwm_hz),
+                Short(control_hz)
             ),
             Self::TimerPeriod { counts } => write!(
                 f,
@@ -487,14 +490,19 @@ impl fmt::Display for InvalidScenario {
                 max_s,
             } => write!(
                 f,
-                "run.duration_s = {duration_s}: must be from {min_s} (one step) to {max_s}"
+                "run.duration_s = {}: must be from {} (one step) to {}",
+                Short(duration_s),
+                Short(min_s),
+                Short(max_s)
             ),
             Self::DitherFrequency {
                 frequency_rad_per_s,
                 max_rad_per_s,
             } => write!(
                 f,
-                "dither frequency {frequency_rad_per_s} rad/s: must be at most {max_rad_per_s} rad/s, half of run.pwm_rate_hz"
+                "dither frequency {} rad/s: must be at most {} rad/s, half of run.pwm_rate_hz",
+                Short(frequency_rad_per_s),
+                Short(max_rad_per_s)
             ),
             Self::OverVoltage {
                 motor_v,
@@ -502,9 +510,12 @@ impl fmt::Display for InvalidScenario {
                 bus_v,
             } => write!(
                 f,
-                "dither.amplitude_v = {dither_v}: with {motor_v} V for the motor current it exceeds servo.bus_voltage_v = \
-                 {bus_v}; at most {} V are left for the dither",
-                Self::left_for_dither_v(motor_v, bus_v)
+                "dither.amplitude_v = {}: with {} V for the motor current it exceeds servo.bus_voltage_v = {}; at most {} V \
+                 are left for the dither",
+                Short(dither_v),
+                Short(motor_v),
+                Short(bus_v),
+                Short(Self::left_for_dither_v(motor_v, bus_v))
             ),
             Self::StepTooLong {
                 field,

@@ -75,16 +75,7 @@ pub fn preset(name: &str) -> Result<Preset, ConfigError> {
     Preset::from_name(name).ok_or_else(|| ConfigError::UnknownPreset { name: name.into() })
 }
 
-/// The scenario of a file over a preset: the one named, else that named in the file, else `reconstruction`. Without a file,
-/// the preset itself.
-///
-/// # Errors
-/// If the file cannot be read, has a key that no parameter has, or a value of the wrong kind.
-pub fn load(file: Option<&Path>, preset_name: Option<&str>) -> Result<Scenario<f64>, ConfigError> {
-    over_preset(file.map_or_else(|| Ok(Table::new()), read)?, preset_name)
-}
-
-/// As [`load`], from a file that is read already.
+/// The scenario of a file's table over a preset: the one named, else that named in the file, else `reconstruction`.
 ///
 /// # Errors
 /// If it has a key that no parameter has, or a value of the wrong kind.

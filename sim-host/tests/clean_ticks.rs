@@ -15,7 +15,7 @@ const WAVEFORMS: [Waveform; 3] = [Waveform::None, Waveform::Square, Waveform::Si
 
 /// The files' manoeuvres, and constant speeds from rest to the fastest chaos, each waveform, requests to both sides.
 fn drives() -> Vec<(Scenario<f64>, Manoeuvre)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/manoeuvres");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/manoeuvres");
     let files = folder.read_dir().expect("the examples are there");
     let mut drives: Vec<_> = files
         .map(|file| load(&file.expect("readable").path()).expect("valid"))

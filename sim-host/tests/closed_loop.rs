@@ -30,7 +30,7 @@ fn period(run: &Run) -> Period {
 }
 
 fn example(file: &str) -> (Scenario<f64>, Manoeuvre) {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/manoeuvres");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/manoeuvres");
     load(&folder.join(file)).expect("the example is valid")
 }
 

@@ -104,23 +104,29 @@ fn bad_input_is_refused() {
         ("--shard 1/2", &["--work"]),
         ("--shard 1/2 --work w --out o.csv", &["--shard", "--out"]),
         ("--out o.csv --from nan", &["wheel speed", "NaN", "finite"]),
+        ("--out o.csv --step 0", &["wheel speed", "in steps of 0"]),
+        ("--out o.csv --step 10 --speeds 9", &["--step", "--speeds"]),
         (
-            "--out o.csv --from 2000 --to 1000",
-            &["wheel speed", "from 2000 to 1000", "reversed"],
+            "--out o.csv --square-step 0.1 --amplitudes 9",
+            &["--square-step", "--amplitudes"],
+        ),
+        (
+            "--out o.csv --square-step 0.1 --sine-step 0.1",
+            &["as many amplitudes"],
         ),
         ("--out o.csv --from -5", &["wheel_speed_rpm = -5", "from 1"]),
         (
             "--out o.csv --square-to -0.1",
-            &["amplitude", "-0.1", "reversed"],
+            &["amplitude_v = -0.1", "from 0"],
         ),
         ("--out o.csv --sine-to inf", &["amplitude", "inf", "finite"]),
         (
             "--out o.csv --speeds 1",
-            &["wheel speed", "1 cells", "at least 2"],
+            &["wheel speed", "1 value from 1000 to 2000", "at least two"],
         ),
         (
             "--out o.csv --amplitudes 0",
-            &["amplitude", "0 cells", "at least 2"],
+            &["amplitude", "0 values", "at least two"],
         ),
         (
             "--out o.csv --speeds 100000 --amplitudes 100000",

@@ -266,7 +266,7 @@ fn noise_has_its_deviation_and_its_seed() {
 }
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/manoeuvres")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/manoeuvres")
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn plan(from_rpm: f64, to_rpm: f64, greatest_v: f64) -> Plan {
     let step_v = greatest_v / 30.0;
     Plan {
         speeds_rpm: Values::new("wheel speed", from_rpm, to_rpm, 25.0).unwrap(),
-        amplitudes_v: Values::new("amplitude", 0.0, greatest_v, step_v).unwrap(),
+        amplitudes_v: Values::parts("amplitude", greatest_v, 30).unwrap(),
         edge_width_v: step_v / 16.0,
         margin: 0.25,
         timing: Timing::new(150.0, 200.0).unwrap(),
@@ -116,7 +116,7 @@ fn a_speed_that_nothing_calms_fails() {
 #[test]
 fn bad_input_is_refused_and_nothing_is_written() {
     for (rest, parts) in [
-        ("--from 1900 --to 1600", &["reversed"][..]),
+        ("--from 1900 --to 1e300", &["ten million"][..]),
         ("--step 0", &["in steps of 0", "greater than 0"]),
         ("--step nan", &["in steps of NaN", "finite"]),
         ("--from 0 --to 50", &["run.wheel_speed_rpm = 0"]),
@@ -127,6 +127,10 @@ fn bad_input_is_refused_and_nothing_is_written() {
         ("--sine-to -1", &["amplitude of the sine", "-1"]),
         ("--sine-to 20", &["bus_voltage"]),
         ("--amplitudes 1", &["--amplitudes"]),
+        (
+            "--square-step 0.1",
+            &["2 values from 0 to 0.15", "3 to 1001"],
+        ),
         ("--transient 200", &["transient of 200 s", "shorter"]),
     ] {
         let folder = folder();
@@ -181,7 +185,7 @@ fn maps_that_do_not_fit_or_are_none_are_refused() {
         }
     };
     let grid = "--square-to 0.12 --sine-to 1.2 --amplitudes 9 --transient 20 --time 60";
-    let fits = format!("sim-host map --start both --from 1500 --to 1900 --speeds 5 {grid}");
+    let fits = format!("sim-host map --start both --from 1500 --to 1900 --step 100 {grid}");
     refused(&usual, &["m.parquet", "No such file", &fits]);
     let no_table = "no Parquet file, or not a whole one";
     let file = at.join("m.parquet");
@@ -222,7 +226,11 @@ fn maps_that_do_not_fit_or_are_none_are_refused() {
             "--amplitudes 9",
             "9 from 0 to 0.12 V, not 10 from 0 to 0.12 V",
         ),
-        ("--to 1900", "--to 1500", "at least 2"),
+        (
+            "--to 1900",
+            "--to 1500",
+            "5 from 1500 to 1900 rpm, not 1 from 1500 to 1500 rpm",
+        ),
     ] {
         refused(&usual.replace(fitting, other), &[part]);
     }

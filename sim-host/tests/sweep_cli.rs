@@ -18,8 +18,8 @@ fn ranges_are_checked() {
     for command in ["orbit", "regions"] {
         let line = |rest: &str| format!("{command} {rest}");
         assert_refused(
-            &line("--from 1900 --to 1600"),
-            &["from 1900 to 1600", "reversed"],
+            &line("--from 1900 --to 1e300"),
+            &["from 1900 to 1e300 in steps of 5", "ten million"],
         );
         assert_refused(
             &line("--from 1600 --to 1900 --step 0"),
@@ -56,15 +56,18 @@ fn ranges_are_checked() {
     assert_refused("regions --width 0", &["--width 0", "at least"]);
     assert_refused("regions --width nan", &["--width NaN", "finite"]);
     assert_refused(
-        "basin --beta-from 0.3 --beta-to -0.3",
-        &["sideslip angle", "reversed"],
+        "basin --beta-from 0.3 --beta-to -1e300",
+        &["sideslip angle", "to -1e300 in", "ten million"],
     );
     assert_refused(
         "basin --delta-step 0",
         &["steering angle", "greater than 0"],
     );
     assert_refused("basin --beta-step 0.001 --delta-step 0.001", &["--yes"]);
-    assert_refused("equilibria --from 2000 --to 1000", &["reversed"]);
+    assert_refused(
+        "equilibria --from 2000 --to 1000 --step 0",
+        &["in steps of 0"],
+    );
     assert_refused("equilibria --from 1000", &["--to"]);
     assert_refused("equilibria --rpm 1750 --time 10", &["--time 10"]);
     assert_refused("equilibria --rpm 0", &["run.wheel_speed_rpm = 0"]);
@@ -129,5 +132,59 @@ fn diverging_motions_are_named_and_have_no_numbers() {
             fs::read_to_string(folder.path().join(format!("{analysis}.csv"))).expect("written");
         assert!(csv.contains("diverges"), "{csv}");
         assert!(!csv.contains("NaN") && !csv.contains("inf"), "{csv}");
+    }
+}
+
+/// Upwards, downwards, and of one value: all as a reader types them, ascending.
+#[test]
+fn ranges_have_the_decimals_that_were_typed() {
+    let folder = folder();
+    let run = "--transient 5 --time 10 --out o.csv --force";
+    for (line, column, typed) in [
+        (
+            "orbit --over amplitude --dither square --from 0 --to 0.35 --step 0.1",
+            "dither_amplitude_v",
+            &["0.0", "0.1", "0.2", "0.3"][..],
+        ),
+        (
+            "orbit --over amplitude --dither square --from 0.3 --to 0 --step 0.1",
+            "dither_amplitude_v",
+            &["0.0", "0.1", "0.2", "0.3"],
+        ),
+        (
+            "orbit --from 1700.3 --to 1700 --step -0.1",
+            "wheel_speed_rpm",
+            &["1700.0", "1700.1", "1700.2", "1700.3"],
+        ),
+        (
+            "orbit --from 1700 --to 1700",
+            "wheel_speed_rpm",
+            &["1700.0"],
+        ),
+        (
+            "map --dither square --from 1700.1 --to 1700.1 --speeds 1 --square-to 0.3 --square-step 0.1 --work w1",
+            "dither_amplitude_v",
+            &["0.0", "0.1", "0.2", "0.3"],
+        ),
+        (
+            "map --dither square --from 1700 --to 1700 --step 1 --square-from 0.3 --square-to 0.3 --amplitudes 1 --work w2",
+            "dither_amplitude_v",
+            &["0.3"],
+        ),
+        (
+            "map --dither square --from 1700.3 --to 1700.1 --speeds 3 --square-to 0 --square-step 1 --work w3",
+            "wheel_speed_rpm",
+            &["1700.1", "1700.2", "1700.3"],
+        ),
+    ] {
+        let arguments = format!("{line} {run}");
+        assert_ends(&mut command(folder.path(), arguments.split(' ')), 0);
+        let mut csv = csv::Reader::from_path(folder.path().join("o.csv")).expect("CSV");
+        let headers = csv.headers().expect("a header").clone();
+        let index = headers.iter().position(|name| name == column);
+        let rows = csv.records().map(|row| row.expect("a row"));
+        let mut found: Vec<String> = rows.map(|row| row[index.expect(column)].into()).collect();
+        found.dedup();
+        assert_eq!(found, typed, "{line}");
     }
 }

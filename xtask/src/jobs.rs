@@ -6,6 +6,7 @@ pub mod firmware;
 pub mod fuzz;
 pub mod lint;
 pub mod mutants;
+pub mod package;
 pub mod proofs;
 pub mod setup;
 pub mod target_cost;

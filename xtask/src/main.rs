@@ -110,6 +110,10 @@ enum Command {
         board: String,
     },
 
+    /// Packs every publishable package, and builds each from its package alone. Publishes nothing.
+    #[command(after_help = "Example:\n  cargo xtask package")]
+    Package,
+
     /// Runs the model's tests with a counter in each line; fails if a line of gate or controller is run by none.
     ///
     /// Needs LLVM's llvm-profdata and llvm-cov; says what to install where they are missing.
@@ -150,6 +154,7 @@ fn main() -> ExitCode {
         Command::TargetCost { overwrite_expected } => jobs::target_cost::run(overwrite_expected),
         Command::Lint => jobs::lint::run(),
         Command::Firmware { board } => jobs::firmware::run(&board),
+        Command::Package => jobs::package::run(),
         Command::Coverage => jobs::coverage::run(),
         Command::Mutants => jobs::mutants::run(),
         Command::Fuzz { target, inputs } => jobs::fuzz::run(target.as_deref(), inputs),

@@ -1,8 +1,10 @@
 //! What sweeps share: the parameter that is swept, its values, the times of a run, and the work on many points at once.
 
+use crate::decimal::{NotSpaced, Spaced};
 use crate::interrupt;
 use crate::motion::EarlyEnd;
 use crate::simulate::Unsettled;
+use crate::words::{Short, counted};
 use rayon::prelude::*;
 use shared_model::dither::Waveform;
 use shared_model::vehicle::State;
@@ -10,7 +12,7 @@ use shared_model::{InvalidScenario, Scenario};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Most values of one range.
-const MAX_VALUES: f64 = 1e7;
+const MAX_VALUES: usize = 10_000_000;
 
 /// Most items of a batch: the engine's lanes are full for most of its time, and a stop is heard soon.
 pub const LARGEST_BATCH: usize = 64;
@@ -72,8 +74,8 @@ impl Parameter {
 /// Why a sweep cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SweepError {
-    /// A bound or step is not finite, the step is not positive, or the bounds are reversed.
-    #[error("{what}: from {from} to {to} in steps of {step}: {fault}")]
+    /// Bounds and step are no range.
+    #[error("{what}: from {} to {} in steps of {}: {fault}", Short(*.from), Short(*.to), Short(*.step))]
     Range {
         /// What the range is of.
         what: &'static str,
@@ -86,9 +88,24 @@ pub enum SweepError {
         /// What is wrong, with bounds.
         fault: &'static str,
     },
+    /// Bounds and number are no range.
+    #[error("{what}: {} from {} to {}: {fault}", counted(*.count, "value"), Short(*.from), Short(*.to))]
+    Count {
+        /// What the range is of.
+        what: &'static str,
+        /// One end.
+        from: f64,
+        /// The other end.
+        to: f64,
+        /// How many values.
+        count: usize,
+        /// What is wrong, with bounds.
+        fault: &'static str,
+    },
     /// Nothing of the run is left behind the transient.
     #[error(
-        "a run of {time_s} s with a transient of {transient_s} s: the transient must be at least 0 and shorter than the run"
+        "a run of {} s with a transient of {} s: the transient must be at least 0 and shorter than the run",
+        Short(*.time_s), Short(*.transient_s)
     )]
     Timing {
         /// Length of the whole run, s.
@@ -132,19 +149,23 @@ impl From<Unsettled> for SweepError {
     }
 }
 
-/// Equally spaced values.
+/// Equally spaced values, each the double nearest to its decimal value; but for those by [`parts`](Self::parts).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Values {
-    from: f64,
-    step: f64,
-    count: usize,
+pub struct Values(Kind);
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    Decimal(Spaced),
+    Multiples { of: f64, count: usize },
 }
 
 impl Values {
-    /// The values from `from` to `to` in steps of `step`; `what` they are of is for the message.
+    /// The values from `from` on in steps of `step`, not beyond `to`, which may be the lower one; `what` they are of is for the
+    /// message.
     ///
     /// # Errors
-    /// If a number is not finite, the step is not positive, `to` is below `from`, or there are more than ten million.
+    /// If a number is not finite, the step is 0 or leads away from `to`, values are more than ten million, or neighbours are the
+    /// same number.
     pub fn new(what: &'static str, from: f64, to: f64, step: f64) -> Result<Self, SweepError> {
         let refuse = |fault| {
             Err(SweepError::Range {
@@ -158,32 +179,106 @@ impl Values {
         if ![from, to, step].iter().all(|value| value.is_finite()) {
             return refuse("all three must be finite numbers");
         }
-        if step <= 0.0 {
-            return refuse("the step must be greater than 0");
+        if step == 0.0 || step < 0.0 && to >= from {
+            return refuse("the step must be greater than 0; only downwards it may be less");
         }
-        if to < from {
-            return refuse("the range is reversed; the upper bound must be at least the lower one");
+        match Spaced::in_steps(from, to, step, MAX_VALUES) {
+            Ok(values) => Ok(Self(Kind::Decimal(values))),
+            Err(fault) => refuse(words(fault)),
         }
-        // A bound that rounding puts just out of reach belongs to the range.
-        let count = ((to - from) / step + 1e-9).floor() + 1.0;
-        if count > MAX_VALUES {
-            return refuse("these are more than ten million values");
+    }
+
+    /// `count` values, `from` and `to` among them.
+    ///
+    /// # Errors
+    /// If a number is not finite, there is no value, or neighbours are the same number.
+    pub fn between(
+        what: &'static str,
+        from: f64,
+        to: f64,
+        count: usize,
+    ) -> Result<Self, SweepError> {
+        let refuse = |fault| {
+            Err(SweepError::Count {
+                what,
+                from,
+                to,
+                count,
+                fault,
+            })
+        };
+        if !from.is_finite() || !to.is_finite() {
+            return refuse("both must be finite numbers");
         }
-        Ok(Self {
-            from,
-            step,
-            count: count as usize,
-        })
+        if count == 0 || (count == 1) != (from == to) {
+            return refuse("there must be at least two, or one with both ends the same");
+        }
+        match Spaced::between(from, to, count) {
+            Ok(values) => Ok(Self(Kind::Decimal(values))),
+            Err(fault) => refuse(words(fault)),
+        }
+    }
+
+    /// The ends of `parts` equal parts from 0 to `to`, as multiples of the double that is nearest to one: the ECU's table is made
+    /// from these, and depends on their last bits.
+    ///
+    /// # Errors
+    /// If `to` is not a positive number, or there is no part.
+    pub fn parts(what: &'static str, to: f64, parts: usize) -> Result<Self, SweepError> {
+        let count = parts.saturating_add(1);
+        if to <= 0.0 {
+            return Err(SweepError::Count {
+                what,
+                from: 0.0,
+                to,
+                count,
+                fault: "the end must be greater than 0",
+            });
+        }
+        Self::between(what, 0.0, to, count)?;
+        Ok(Self(Kind::Multiples {
+            of: to / parts as f64,
+            count,
+        }))
     }
 
     /// How many there are.
     pub fn count(&self) -> usize {
-        self.count
+        match &self.0 {
+            Kind::Decimal(values) => values.count(),
+            Kind::Multiples { count, .. } => *count,
+        }
+    }
+
+    /// Value number `k` of the ascending ones, from 0 on.
+    pub fn at(&self, k: usize) -> f64 {
+        match &self.0 {
+            Kind::Decimal(values) => values.at(k),
+            Kind::Multiples { of, .. } => k as f64 * of,
+        }
+    }
+
+    /// The least.
+    pub fn first(&self) -> f64 {
+        self.at(0)
+    }
+
+    /// The greatest.
+    pub fn last(&self) -> f64 {
+        self.at(self.count() - 1)
     }
 
     /// The values, ascending.
     pub fn iter(&self) -> impl DoubleEndedIterator<Item = f64> + '_ {
-        (0..self.count).map(|k| self.from + k as f64 * self.step)
+        (0..self.count()).map(|k| self.at(k))
+    }
+}
+
+fn words(fault: NotSpaced) -> &'static str {
+    match fault {
+        NotSpaced::TooMany => "these are more than ten million values",
+        NotSpaced::TooFarApart => "the numbers differ too much in size to be counted in decimals",
+        NotSpaced::TooClose => "neighbouring values would be the same number",
     }
 }
 

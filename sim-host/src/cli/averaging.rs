@@ -6,6 +6,7 @@ use anyhow::ensure;
 use shared_model::dither::Waveform;
 use sim_host::averaging::{Comparison, compare};
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::Short;
 
 /// The true dither signal against the averaged system, over the dither's frequency: where averaging starts to hold.
 ///
@@ -13,14 +14,15 @@ use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host averaging --dither square --amplitude-v 0.1
-  sim-host averaging --dither sine --amplitude-v 1 --from 200 --to 20000 --points 30 --figure averaging.svg")]
+  sim-host averaging --dither sine --amplitude-v 1 --from 500 --to 20000 \\
+      --points 9 --figure averaging.svg")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
-    /// Least frequency, rad/s
+    /// One end of the frequencies, rad/s
     #[arg(long, value_name = "RAD_PER_S", default_value_t = 200.0)]
     from: f64,
-    /// Greatest frequency, rad/s
+    /// Other end, rad/s
     #[arg(long, value_name = "RAD_PER_S", default_value_t = 20_000.0)]
     to: f64,
     /// Number of frequencies, evenly spaced in their logarithm
@@ -32,16 +34,24 @@ pub struct Arguments {
 
 /// Slower dither is no faster than the motion; faster needs a PWM rate that no timer has.
 const FREQUENCIES_RAD_PER_S: std::ops::RangeInclusive<f64> = 50.0..=100_000.0;
-const POINTS: std::ops::RangeInclusive<u32> = 2..=200;
+const POINTS: std::ops::RangeInclusive<u32> = 1..=200;
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let (from, to, points) = (arguments.from, arguments.to, arguments.points);
     let allowed = &FREQUENCIES_RAD_PER_S;
     ensure!(
-        allowed.contains(&from) && allowed.contains(&to) && from < to,
-        "--from {from} --to {to}: must be rising, from {} to {} rad/s",
+        allowed.contains(&from) && allowed.contains(&to),
+        "--from {} --to {}: both must be from {} to {} rad/s",
+        Short(from),
+        Short(to),
         allowed.start(),
         allowed.end()
+    );
+    ensure!(
+        (points == 1) == (from == to),
+        "--points {points} --from {} --to {}: one frequency has both ends the same, and more have not",
+        Short(from),
+        Short(to)
     );
     ensure!(
         POINTS.contains(&points),
@@ -54,17 +64,25 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         scenario.dither.waveform != Waveform::None && scenario.dither.amplitude_v > 0.0,
         "there is no dither to average: give --dither square or sine, and --amplitude-v"
     );
-    arguments.destinations.check_free()?;
-    let ratio = (to / from).ln() / f64::from(points - 1);
-    let frequencies: Vec<f64> = (0..points)
-        .map(|k| from * (ratio * f64::from(k)).exp())
-        .collect();
+    arguments.destinations.check(arguments.run.config.input())?;
+    let frequencies = frequencies(from.min(to), from.max(to), points);
     let comparisons = compare(&scenario, &frequencies)?;
     show(&comparisons);
     arguments
         .destinations
         .write(&comparisons, &comparisons, || chart(&comparisons).svg())?;
     Ok(Done::Well)
+}
+
+/// Frequencies that are evenly spaced in their logarithm, both ends among them.
+fn frequencies(least: f64, greatest: f64, points: u32) -> Vec<f64> {
+    let ratio = (greatest / least).ln() / f64::from(points.max(2) - 1);
+    let mut all: Vec<f64> = (0..points)
+        .map(|k| least * (ratio * f64::from(k)).exp())
+        .collect();
+    // Rounding has moved the last.
+    all[points as usize - 1] = greatest;
+    all
 }
 
 fn show(comparisons: &[Comparison]) {

@@ -8,6 +8,7 @@ use sim_host::chaos::attractor::{Attractor, Kind};
 use sim_host::chaos::basin::{Basin, Cell, basin};
 use sim_host::chaos::sweep::{Timing, Values};
 use sim_host::report::chart::{AxisSpec, Chart, Panel};
+use sim_host::words::counted;
 
 /// Basins of attraction: which start ends on which attractor, over a grid of sideslip and steering angles.
 ///
@@ -15,14 +16,15 @@ use sim_host::report::chart::{AxisSpec, Chart, Panel};
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host basin --rpm 1750 --out basin.csv --figure basin.svg
-  sim-host basin --rpm 1600 --beta-from -0.4 --beta-to 0.4 --beta-step 0.02 --delta-step 0.02 --json basin.json")]
+  sim-host basin --rpm 1600 --beta-from -0.4 --beta-to 0.4 --beta-step 0.02 \\
+      --delta-step 0.02 --json basin.json")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
-    /// Least sideslip angle at the start, rad
+    /// One end of the sideslip angles at the start, from which the steps count, rad
     #[arg(long, value_name = "RAD", default_value_t = -0.3, allow_negative_numbers = true)]
     beta_from: f64,
-    /// Greatest sideslip angle at the start, rad
+    /// Other end of the sideslip angles, rad
     #[arg(
         long,
         value_name = "RAD",
@@ -38,10 +40,10 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     beta_step: f64,
-    /// Least steering angle at the start, rad
+    /// One end of the steering angles at the start, from which the steps count, rad
     #[arg(long, value_name = "RAD", default_value_t = -0.6, allow_negative_numbers = true)]
     delta_from: f64,
-    /// Greatest steering angle at the start, rad
+    /// Other end of the steering angles, rad
     #[arg(
         long,
         value_name = "RAD",
@@ -90,7 +92,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let (from, to) = (arguments.delta_from, arguments.delta_to);
     let deltas = Values::new("steering angle (rad)", from, to, arguments.delta_step)?;
     let timing = arguments.transient.timing(&arguments.run, OBSERVED_S)?;
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.config.input())?;
     let runs = betas.count().saturating_mul(deltas.count());
     let announced = &arguments.transient;
     announced.announce(runs, timing, &scenario, side_by_side())?;
@@ -113,7 +115,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         .write(rows, &results, || chart(&results).svg())?;
     for (k, attractor) in basin.attractors.iter().enumerate() {
         let cells = basin.cells.iter().filter(|c| c.attractor == k).count();
-        say!("attractor {k}: {} ({cells} starts)", name(attractor));
+        say!(
+            "attractor {k}: {} ({})",
+            name(attractor),
+            counted(cells, "start")
+        );
     }
     check_interrupted(basin.cells.len(), runs)?;
     Ok(Done::Well)

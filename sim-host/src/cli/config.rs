@@ -6,9 +6,9 @@ use sim_host::config::{to_toml, validate};
 /// Print a complete configuration as TOML, checked. Names carry their units.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host config > vehicle.toml                    all parameters of the paper's vehicle, to be edited
-  sim-host config --preset printed                  the equations as printed
-  sim-host config --config vehicle.toml             check a file and print it completed")]
+  sim-host config > vehicle.toml        # the paper's vehicle, to be edited
+  sim-host config --preset printed      # the equations as printed
+  sim-host config --config vehicle.toml # check a file and print it completed")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,

@@ -5,6 +5,7 @@ use super::{Done, RunOptions};
 use anyhow::ensure;
 use sim_host::convergence::{Error, errors};
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::Short;
 
 /// Error of the ECU's fixed step against the reference integrator, over the length of the step.
 ///
@@ -12,7 +13,7 @@ use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 /// grows: compare over a few seconds.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host convergence                              the paper's vehicle over 4 s, friction events included
+  sim-host convergence                  # over 4 s, friction events included
   sim-host convergence --dither sine --amplitude-v 1 --figure convergence.svg")]
 pub struct Arguments {
     #[command(flatten)]
@@ -30,11 +31,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let time_s = arguments.run.time.unwrap_or(TIME_S);
     ensure!(
         TIMES_S.contains(&time_s),
-        "--time {time_s}: must be from {} to {} s",
+        "--time {}: must be from {} to {} s",
+        Short(time_s),
         TIMES_S.start(),
         TIMES_S.end()
     );
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.config.input())?;
     let errors = errors(&scenario, time_s)?;
     say!("{:>10}  {:>10}  {:>6}", "step (s)", "error", "order");
     for error in &errors {

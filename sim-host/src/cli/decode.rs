@@ -1,16 +1,18 @@
 //! `sim-host decode`: the firmware's telemetry as CSV.
 
-use super::output::check_free;
+use super::output::{check, named};
 use super::{Done, simulate};
 use sim_host::pil::qemu::meaning;
 use sim_host::pil::telemetry::Recording;
+use sim_host::words::counted;
 use std::path::PathBuf;
 
 /// Check a telemetry file of the firmware, say how its run ended, and write its motion as CSV.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
-  (cd firmware && cargo run -- telemetry=run.bin run.duration_s=5)
-  sim-host decode firmware/run.bin --out run.csv")]
+#[command(after_help = "Examples:
+  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+      telemetry=decode.bin run.duration_s=5
+  sim-host decode decode.bin --out decode.csv")]
 pub struct Arguments {
     /// Telemetry file
     telemetry: PathBuf,
@@ -23,19 +25,18 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
-    if let Some(out) = &arguments.out {
-        check_free(out, arguments.force)?;
-    }
+    let input = ("the telemetry", arguments.telemetry.as_path());
+    check([input], [named("--out", &arguments.out)], arguments.force)?;
     let recording = Recording::open(&arguments.telemetry)?;
     let trailer = &recording.trailer;
     say!(
-        "{} records of {} duty codes; exit code {}: {}; {} overruns; deepest stack {} bytes; PWM at {} of {} (neutral {})",
-        recording.records.len(),
-        recording.header.samples_per_step,
+        "{} of {}; exit code {}: {}; {}; deepest stack {}; PWM at {} of {} (neutral {})",
+        counted(recording.records.len(), "record"),
+        counted(recording.header.samples_per_step, "duty code"),
         trailer.exit_code,
         meaning(trailer.exit_code.try_into().unwrap_or(-1)),
-        trailer.overruns,
-        trailer.stack_bytes,
+        counted(trailer.overruns, "overrun"),
+        counted(trailer.stack_bytes, "byte"),
         trailer.final_duty,
         recording.header.pwm_period,
         trailer.neutral_duty,

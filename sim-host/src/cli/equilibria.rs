@@ -1,15 +1,15 @@
 //! `sim-host equilibria`: equilibria, their eigenvalues, and Hopf bifurcations.
 
 use super::output::Destinations;
-use super::sweep::{check_interrupted, large_dots, with_progress};
+use super::sweep::{SpeedRange, check_interrupted, large_dots, with_progress};
 use super::{Done, RunOptions};
 use anyhow::{bail, ensure};
 use serde::Serialize;
 use shared_model::vehicle::STEERING_ANGLE;
 use sim_host::chaos::eigenvalues::Eigenvalue;
 use sim_host::chaos::equilibria::{Equilibrium, Hopf, hopf, over_speed};
-use sim_host::chaos::sweep::Values;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::{counted, counted_as};
 
 /// All equilibria at a wheel speed or over a range of speeds, with eigenvalues and stability, and the speeds of Hopf
 /// bifurcations.
@@ -19,37 +19,14 @@ use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 /// held.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host equilibria --rpm 1750                                          all equilibria of the paper's vehicle
-  sim-host equilibria --from 1000 --to 2000 --step 10 --figure hopf.svg   over speed, with Hopf bifurcations
-  sim-host equilibria --rpm 1750 --dither square --amplitude-v 0.1 --json equilibria.json")]
+  sim-host equilibria --rpm 1750        # all of the paper's vehicle
+  sim-host equilibria --from 1000 --to 2000 --step 10 --figure hopf.svg
+  sim-host equilibria --dither square --amplitude-v 0.1 --json equilibria.json")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
-    /// Least wheel speed, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        requires = "to",
-        conflicts_with = "rpm",
-        allow_negative_numbers = true
-    )]
-    from: Option<f64>,
-    /// Greatest wheel speed, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        requires = "from",
-        allow_negative_numbers = true
-    )]
-    to: Option<f64>,
-    /// Step of the wheel speed, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        default_value_t = 10.0,
-        allow_negative_numbers = true
-    )]
-    step: f64,
+    #[command(flatten)]
+    range: SpeedRange,
     #[command(flatten)]
     destinations: Destinations,
 }
@@ -123,15 +100,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     if let Some(time_s) = arguments.run.time {
         bail!("--time {time_s}: equilibria are solved for, not run to; leave it out");
     }
-    let rpm = scenario.run.wheel_speed_rpm;
-    let (from, to) = (arguments.from.unwrap_or(rpm), arguments.to.unwrap_or(rpm));
-    let values = Values::new("wheel speed (rpm)", from, to, arguments.step)?;
+    let values = arguments.range.values(&scenario)?;
     ensure!(
         values.count() <= MOST_SPEEDS,
         "{} speeds: must be at most {MOST_SPEEDS}",
         values.count()
     );
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.config.input())?;
     let found = with_progress(values.count(), |watch| {
         over_speed(&scenario, &values, watch)
     })?;
@@ -160,7 +135,7 @@ fn show(results: &Results) {
     if let [speed] = &results.speeds[..] {
         show_speed(speed);
     } else {
-        say!("equilibria at {} speeds", results.speeds.len());
+        say!("equilibria at {}", counted(results.speeds.len(), "speed"));
     }
     for hopf in &results.hopf {
         say!(
@@ -183,8 +158,8 @@ fn show(results: &Results) {
 
 fn show_speed(speed: &Speed) {
     say!(
-        "{} equilibria at {} rpm",
-        speed.equilibria.len(),
+        "{} at {} rpm",
+        counted_as(speed.equilibria.len(), "equilibrium", "equilibria"),
         speed.wheel_speed_rpm
     );
     for equilibrium in &speed.equilibria {

@@ -1,6 +1,6 @@
 //! `sim-host faults`: faults on purpose, and whether any of them stays unfound.
 
-use super::output::Destinations;
+use super::output::{Destinations, named};
 use super::{Done, time_out};
 use anyhow::Context;
 use clap::Args;
@@ -11,6 +11,7 @@ use sim_host::closed_loop::fault::campaign::{self, Clean, Row, Total, totals};
 use sim_host::closed_loop::fault::catalogue::{self, Class};
 use sim_host::closed_loop::fault::manoeuvres;
 use sim_host::report::fault_matrix;
+use sim_host::words::counted;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -33,7 +34,8 @@ const MOST_NAMED: usize = 20;
 #[derive(Args)]
 #[command(after_help = "Examples:
   sim-host faults --quick
-  sim-host faults --firmware target/thumbv7em-none-eabihf/firmware/ecu --out faults.csv --json faults.json --figure faults.svg")]
+  sim-host faults --firmware target/thumbv7em-none-eabihf/firmware/ecu \\
+      --out faults.csv --json faults.json --figure faults.svg")]
 pub struct Arguments {
     /// One moment of injection a manoeuvre, and few bits
     #[arg(long)]
@@ -55,7 +57,8 @@ struct Results<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
-    arguments.destinations.check_free()?;
+    let firmware = named("--firmware", &arguments.firmware);
+    arguments.destinations.check(firmware)?;
     let limit = time_out(arguments.time_out)?;
     let mut rows = on_host(arguments.quick)?;
     match &arguments.firmware {
@@ -185,6 +188,9 @@ fn report(rows: &[Row]) {
     let reasons: BTreeSet<_> = rows.iter().filter_map(|row| row.accepted).collect();
     for reason in reasons {
         let of_it = rows.iter().filter(|row| row.accepted == Some(reason));
-        say!("silent and listed, {} times: {reason}", of_it.count());
+        say!(
+            "silent and listed, {}: {reason}",
+            counted(of_it.count(), "time")
+        );
     }
 }

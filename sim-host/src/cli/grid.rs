@@ -1,13 +1,13 @@
-//! What the subcommands share that look at the plane of wheel speed and dither amplitude: its ends, and the times of each run.
+//! What the subcommands share that look at the plane of wheel speed and dither amplitude: its axes, and the times of each run.
 
 use clap::Args;
 use shared_model::dither::Waveform;
 use sim_host::chaos::sweep::{SweepError, Timing};
 
-/// Ends of the plane's axes; amplitudes begin at 0.
+/// The plane's axes; amplitudes begin at 0 unless they are given another beginning.
 #[derive(Args)]
 pub struct GridOptions {
-    /// Least wheel speed, rpm
+    /// One end of the wheel speeds, from which the steps count, rpm
     #[arg(
         long,
         value_name = "RPM",
@@ -15,7 +15,7 @@ pub struct GridOptions {
         allow_negative_numbers = true
     )]
     pub from: f64,
-    /// Greatest wheel speed, rpm
+    /// Other end of the wheel speeds, rpm
     #[arg(
         long,
         value_name = "RPM",
@@ -23,6 +23,9 @@ pub struct GridOptions {
         allow_negative_numbers = true
     )]
     pub to: f64,
+    /// Step of the wheel speed, rpm
+    #[arg(long, value_name = "RPM", allow_negative_numbers = true)]
+    pub step: Option<f64>,
     /// Greatest amplitude of the square wave, V
     #[arg(
         long,
@@ -31,6 +34,9 @@ pub struct GridOptions {
         allow_negative_numbers = true
     )]
     pub square_to: f64,
+    /// Step of the square wave's amplitude, V
+    #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
+    pub square_step: Option<f64>,
     /// Greatest amplitude of the sine, V
     #[arg(
         long,
@@ -39,14 +45,21 @@ pub struct GridOptions {
         allow_negative_numbers = true
     )]
     pub sine_to: f64,
+    /// Step of the sine's amplitude, V
+    #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
+    pub sine_step: Option<f64>,
 }
 
 impl GridOptions {
-    /// The waveform's greatest amplitude, V.
-    pub fn amplitude_to_v(&self, waveform: Waveform) -> f64 {
+    /// What the waveform's amplitudes are called, the greatest and their step, V.
+    pub fn amplitudes_v(&self, waveform: Waveform) -> (&'static str, f64, Option<f64>) {
         match waveform {
-            Waveform::Sine => self.sine_to,
-            Waveform::Square | Waveform::None => self.square_to,
+            Waveform::Sine => ("amplitude of the sine (V)", self.sine_to, self.sine_step),
+            Waveform::Square | Waveform::None => (
+                "amplitude of the square wave (V)",
+                self.square_to,
+                self.square_step,
+            ),
         }
     }
 }

@@ -1,10 +1,12 @@
 //! `sim-host image`: what a firmware image needs of its board, and how deep its stack can get.
 
 use super::Done;
-use super::output::write_json;
+use super::output::{check, named};
 use serde::Serialize;
 use sim_host::image::stack::{Level, Stack};
+use sim_host::output::write_json;
 use sim_host::pil::elf::Image;
+use sim_host::words::counted;
 use std::path::PathBuf;
 
 /// Show an image's size and its worst stack with the calls that lead there, read from the machine code.
@@ -12,9 +14,10 @@ use std::path::PathBuf;
 /// The image has to be compiled with `-Zemit-stack-sizes`, as `cargo xtask proofs` does. The stack's figure is a bound:
 /// main program, control task, PWM interrupt, hard fault and watchdog each at their deepest, one on top of the other.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   cargo xtask proofs
-  sim-host image target/stack-sizes/thumbv7em-none-eabihf/firmware/ecu --json stack.json
+  sim-host image --json stack.json \\
+      target/stack-sizes/mps2/thumbv7em-none-eabihf/firmware/ecu
 
 Exit code 1 if there is no bound (recursion, unknown frames), or less RAM than it takes.")]
 pub struct Arguments {
@@ -37,6 +40,8 @@ struct Results<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+    let input = ("the image", arguments.image.as_path());
+    check([input], [named("--json", &arguments.json)], arguments.force)?;
     let image = Image::open(&arguments.image)?;
     let stack = Stack::analyse(&image.bytes)?;
     show(&image, &stack);
@@ -59,9 +64,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 fn show(image: &Image, stack: &Stack) {
     say!("built by {}", image.compiler);
     say!(
-        "{} bytes of flash, {} bytes of RAM without stack",
-        image.flash_bytes,
-        image.ram_bytes
+        "{} of flash, {} of RAM without stack",
+        counted(image.flash_bytes, "byte"),
+        counted(image.ram_bytes, "byte")
     );
     say!(
         "worst stack {} of {} bytes: {} between the levels, and",
@@ -82,8 +87,8 @@ fn show(image: &Image, stack: &Stack) {
         stack.counted_functions
     );
     say!(
-        "calls through pointers, to any of {} functions: {}",
-        stack.address_taken,
+        "calls through pointers, to any of {}: {}",
+        counted(stack.address_taken, "function"),
         stack.indirect_callers.join(", ")
     );
     for problem in &stack.problems {

@@ -1,6 +1,7 @@
 //! `sim-host lyapunov`: Lyapunov exponents over the wheel speed.
 
 use super::output::Destinations;
+use super::sweep::SpeedRange;
 use super::{COULD_NOT_RUN, Done, RunOptions};
 use anyhow::ensure;
 use clap::ValueEnum;
@@ -9,10 +10,11 @@ use serde::Serialize;
 use shared_model::Scenario;
 use sim_host::chaos::flow::{Flow, VehicleFlow};
 use sim_host::chaos::method::{Estimate, Method, estimates};
-use sim_host::chaos::sweep::{Parameter, Timing, Values, Watch, scenarios};
+use sim_host::chaos::sweep::{Parameter, Timing, Watch, scenarios};
 use sim_host::chaos::synchronisation::Search;
 use sim_host::interrupt;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::{Short, counted};
 use std::time::{Duration, Instant};
 
 /// Lyapunov exponents of the motion, at one speed or over a range of speeds, by three independent methods.
@@ -21,33 +23,17 @@ use std::time::{Duration, Instant};
 /// nothing are named in the results. Ctrl-C stops behind the points in work and writes what is done.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host lyapunov --rpm 1750 --method all          three methods side by side
-  sim-host lyapunov --rpm 1750 --spectrum            all four exponents
-  sim-host lyapunov --from 1500 --to 1950 --step 5 --out exponents.csv --figure exponents.svg
+  sim-host lyapunov --rpm 1750 --method all     # three methods side by side
+  sim-host lyapunov --rpm 1750 --spectrum       # all four exponents
+  sim-host lyapunov --from 1500 --to 1950 --step 5 \\
+      --out exponents.csv --figure exponents.svg
   sim-host lyapunov --rpm 1750 --dither square --amplitude-v 0.1
-  sim-host lyapunov --rpm 1600 --method printed-response         equation (20) to the letter")]
+  sim-host lyapunov --rpm 1600 --method printed-response    # equation (20)")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
-    /// Lowest wheel speed of a range, rpm
-    #[arg(long, value_name = "RPM", allow_negative_numbers = true, requires_all = ["to", "step"], conflicts_with = "rpm")]
-    from: Option<f64>,
-    /// Highest wheel speed of a range, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        allow_negative_numbers = true,
-        requires = "from"
-    )]
-    to: Option<f64>,
-    /// Step of the range, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        allow_negative_numbers = true,
-        requires = "from"
-    )]
-    step: Option<f64>,
+    #[command(flatten)]
+    range: SpeedRange,
     /// How the largest exponent is measured
     #[arg(long, value_enum, default_value = "tangent")]
     method: Choice,
@@ -114,7 +100,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         tolerance_per_s: arguments.tolerance,
     }
     .validated()?;
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.config.input())?;
     let methods = methods(arguments);
     let points = scenarios.len() * methods.len();
     announce(&scenarios, &methods, timing, search)?;
@@ -132,8 +118,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     })?;
     if done < points {
         eprintln!(
-            "stopped: {done} of {} points are done; their results are shown, and written where files were asked for",
-            points
+            "stopped after {done} of {}; their results are shown, and written where files were asked for",
+            counted(points, "point")
         );
         return Ok(Done::Code(COULD_NOT_RUN));
     }
@@ -143,10 +129,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 /// One scenario for each speed, checked.
 fn speeds(arguments: &Arguments) -> anyhow::Result<Vec<Scenario<f64>>> {
     let scenario = arguments.run.scenario()?;
-    let (Some(from), Some(to), Some(step)) = (arguments.from, arguments.to, arguments.step) else {
-        return Ok(vec![scenario]);
-    };
-    let values = Values::new("--from, --to, --step: wheel speed (rpm)", from, to, step)?;
+    let values = arguments.range.values(&scenario)?;
     Ok(scenarios(&scenario, Parameter::Speed, &values)?)
 }
 
@@ -155,9 +138,10 @@ fn timing(arguments: &Arguments) -> anyhow::Result<Timing> {
     let timing = Timing::new(arguments.transient, time_s)?;
     ensure!(
         timing.observed_s >= LEAST_OBSERVED_S,
-        "--time {time_s} with --transient {} leaves {} s to measure: must be at least {LEAST_OBSERVED_S} s",
-        timing.transient_s,
-        timing.observed_s
+        "--time {} with --transient {} leaves {} s to measure: must be at least {LEAST_OBSERVED_S} s",
+        Short(time_s),
+        Short(timing.transient_s),
+        Short(timing.observed_s)
     );
     Ok(timing)
 }
@@ -202,9 +186,10 @@ fn announce(
     let seconds = one_speed * step * scenarios.len() as f64 / threads;
     if seconds > ANNOUNCED_S {
         eprintln!(
-            "{} speeds, {} s each: about {seconds:.0} s of work on {threads} threads; Ctrl-C keeps what is done",
-            scenarios.len(),
-            timing.time_s()
+            "{}, {} s each: about {seconds:.0} s of work on {}; Ctrl-C keeps what is done",
+            counted(scenarios.len(), "speed"),
+            timing.time_s(),
+            counted(threads, "thread")
         );
     }
     Ok(())

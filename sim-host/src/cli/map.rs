@@ -1,21 +1,22 @@
 //! `sim-host map`: exponent, period and extent of the motion over wheel speed and dither amplitude.
 
 use super::grid::{GridOptions, TimeOptions};
-use super::output::{Output, check_free};
+use super::output::{Named, check, named};
 use super::{ConfigOptions, Done};
-use anyhow::{bail, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::dither::Waveform;
-use sim_host::chaos::sweep::Watch;
+use sim_host::chaos::sweep::{SweepError, Values, Watch};
 use sim_host::config::validate;
 use sim_host::interrupt;
 use sim_host::map::cell::{Cell, Kind};
 use sim_host::map::plan::{CELLS_A_TILE, Grid, Plan, Sheet, Start};
 use sim_host::map::table;
 use sim_host::map::tiles::{Folder, Shard, plan_of, put_together};
+use sim_host::output::{self, Outputs, write_rows, write_text};
 use sim_host::report::motion_map;
-use std::io::Write;
+use sim_host::words::counted;
 use std::path::PathBuf;
 
 /// The motion over wheel speed N and dither amplitude W: largest Lyapunov exponent, period, extent and kind in each cell.
@@ -28,11 +29,14 @@ use std::path::PathBuf;
 #[command(
     args_conflicts_with_subcommands = true,
     after_help = "Examples:
-  sim-host map --out map.csv --parquet map.parquet --figure map.svg
-  sim-host map --dither square --from 1700 --to 1800 --square-to 0.1 --speeds 64 --amplitudes 64 --figure detail.svg
-  sim-host map --shard 1/2 --work one       on one machine, and on another
-  sim-host map --shard 2/2 --work two
-  sim-host map merge one two --out map.csv  then puts both together"
+  sim-host map --speeds 64 --amplitudes 64 \\
+      --out map.csv --parquet map.parquet --figure map.svg
+  sim-host map --dither square --from 1700 --to 1800 --step 2 \\
+      --square-to 0.1 --square-step 0.002 --figure map-detail.svg
+  # on two machines; then both together
+  sim-host map --speeds 16 --amplitudes 16 --shard 1/2 --work one
+  sim-host map --speeds 16 --amplitudes 16 --shard 2/2 --work two
+  sim-host map merge one two --out map-merged.csv"
 )]
 pub struct Arguments {
     #[command(subcommand)]
@@ -47,11 +51,32 @@ pub struct Arguments {
     start: Starts,
     #[command(flatten)]
     grid: GridOptions,
-    /// Wheel speeds, both ends among them
-    #[arg(long, value_name = "COUNT", default_value_t = 256)]
+    /// Number of wheel speeds, both ends among them, instead of --step
+    #[arg(
+        long,
+        value_name = "COUNT",
+        default_value_t = 256,
+        conflicts_with = "step"
+    )]
     speeds: usize,
-    /// Amplitudes from 0 on, both ends among them
-    #[arg(long, value_name = "COUNT", default_value_t = 256)]
+    /// Least amplitude of the square wave, V
+    #[arg(
+        long,
+        value_name = "VOLTS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    square_from: f64,
+    /// Least amplitude of the sine, V
+    #[arg(
+        long,
+        value_name = "VOLTS",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    sine_from: f64,
+    /// Number of amplitudes of each waveform, both ends among them, instead of --square-step and --sine-step
+    #[arg(long, value_name = "COUNT", default_value_t = 256, conflicts_with_all = ["square_step", "sine_step"])]
     amplitudes: usize,
     #[command(flatten)]
     times: TimeOptions,
@@ -116,23 +141,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         return merge.run();
     }
     let plan = arguments.plan()?;
-    arguments.files.check_free()?;
-    let work = match (&arguments.work, arguments.files.all().next()) {
-        (Some(work), _) => work.clone(),
-        (None, Some(file)) => {
-            let mut name = file.clone().into_os_string();
-            name.push(".tiles");
-            name.into()
-        }
-        (None, None) => bail!("nothing to make: give --out, --parquet, --figure or --work"),
-    };
+    let mut outputs = arguments.files.check(arguments.config.input())?;
+    let work = arguments.work()?;
+    outputs.folder("--work", &work)?;
     let folder = Folder::make(&work, &plan)?;
     let shard = arguments.shard.unwrap_or(Shard::ALL);
     fill(&folder, shard)?;
     let missing = folder.missing(shard).len();
     if missing > 0 {
         bail!(
-            "interrupted: {missing} tiles are still to be made; the same command goes on from those in {}",
+            "interrupted with {} still to be made; the same command goes on from those in {}",
+            counted(missing, "tile"),
             work.display()
         );
     }
@@ -168,14 +187,27 @@ fn fill(folder: &Folder, shard: Shard) -> anyhow::Result<()> {
 }
 
 impl Arguments {
+    /// The folder of the tiles.
+    fn work(&self) -> anyhow::Result<PathBuf> {
+        if let Some(work) = &self.work {
+            return Ok(work.clone());
+        }
+        let mut files = self.files.all().peekable();
+        ensure!(
+            files.peek().is_some(),
+            "nothing to make: give --out, --parquet, --figure or --work"
+        );
+        let file = files.find(|(_, file)| output::is_file(file));
+        let (_, file) =
+            file.context("--work: no file gives the tiles' folder its name; give one")?;
+        let mut name = file.as_os_str().to_owned();
+        name.push(".tiles");
+        Ok(name.into())
+    }
+
     fn plan(&self) -> anyhow::Result<Plan> {
         let scenario = self.config.load()?;
         validate(&scenario)?;
-        let amplitudes_v = |to| Grid {
-            from: 0.0,
-            to,
-            count: self.amplitudes,
-        };
         let waveforms = match self.dither {
             Dither::Square => &[Waveform::Square][..],
             Dither::Sine => &[Waveform::Sine],
@@ -186,22 +218,49 @@ impl Arguments {
             Starts::Mirrored => &[Start::Mirrored],
             Starts::Both => &[Start::Given, Start::Mirrored],
         };
-        let sheet = |start| {
-            waveforms.iter().map(move |&waveform| Sheet {
-                waveform,
-                start,
-                amplitudes_v: amplitudes_v(self.grid.amplitude_to_v(waveform)),
-            })
-        };
-        let speeds_rpm = Grid {
-            from: self.grid.from,
-            to: self.grid.to,
-            count: self.speeds,
-        };
-        let timing = self.times.timing()?;
-        let sheets = starts.iter().copied().flat_map(sheet).collect();
-        Ok(Plan::new(scenario, sheets, speeds_rpm, timing)?)
+        let mut sheets = Vec::new();
+        for &start in starts {
+            for &waveform in waveforms {
+                sheets.push(Sheet {
+                    waveform,
+                    start,
+                    amplitudes_v: self.amplitudes_v(waveform)?,
+                });
+            }
+        }
+        let (from, to) = (self.grid.from, self.grid.to);
+        let speeds_rpm = grid("wheel speed (rpm)", from, to, self.grid.step, self.speeds)?;
+        Ok(Plan::new(
+            scenario,
+            sheets,
+            speeds_rpm,
+            self.times.timing()?,
+        )?)
     }
+
+    fn amplitudes_v(&self, waveform: Waveform) -> Result<Grid, SweepError> {
+        let (what, to, step) = self.grid.amplitudes_v(waveform);
+        let from = match waveform {
+            Waveform::Sine => self.sine_from,
+            Waveform::Square | Waveform::None => self.square_from,
+        };
+        grid(what, from, to, step, self.amplitudes)
+    }
+}
+
+/// An axis in steps, or of so many values.
+fn grid(
+    what: &'static str,
+    from: f64,
+    to: f64,
+    step: Option<f64>,
+    count: usize,
+) -> Result<Grid, SweepError> {
+    let values = match step {
+        Some(step) => Values::new(what, from, to, step),
+        None => Values::between(what, from, to, count),
+    };
+    Ok(values?.into())
 }
 
 impl Merge {
@@ -210,7 +269,9 @@ impl Merge {
             self.files.all().next().is_some(),
             "nothing to make: give --out, --parquet or --figure"
         );
-        self.files.check_free()?;
+        let folders = self.folders.iter();
+        let folders = folders.map(|folder| ("the folder", folder.as_path()));
+        self.files.check(folders)?;
         let plan = plan_of(&self.folders[0])?;
         let folders = self.folders.iter();
         let folders: Vec<Folder> = folders
@@ -224,37 +285,28 @@ impl Merge {
 }
 
 impl Files {
-    fn all(&self) -> impl Iterator<Item = &PathBuf> {
-        let files = [&self.out, &self.parquet, &self.figure];
+    fn all(&self) -> impl Iterator<Item = Named<'_>> {
+        let files = [
+            named("--out", &self.out),
+            named("--parquet", &self.parquet),
+            named("--figure", &self.figure),
+        ];
         files.into_iter().flatten()
     }
 
-    fn check_free(&self) -> anyhow::Result<()> {
-        self.all().try_for_each(|path| check_free(path, self.force))
+    fn check<'a>(&'a self, inputs: impl IntoIterator<Item = Named<'a>>) -> anyhow::Result<Outputs> {
+        check(inputs, self.all().map(Some), self.force)
     }
 
     fn write(&self, plan: &Plan, cells: &[Cell]) -> anyhow::Result<()> {
         if let Some(path) = &self.out {
-            let mut output = Output::create(path, self.force)?;
-            let mut csv = csv::Writer::from_writer(output.writer());
-            for cell in cells {
-                csv.serialize(cell)?;
-            }
-            csv.flush()?;
-            drop(csv);
-            output.finish()?;
+            write_rows(path, cells, self.force)?;
         }
         if let Some(path) = &self.parquet {
-            let mut output = Output::create(path, self.force)?;
-            table::write(plan, cells, output.writer())?;
-            output.finish()?;
+            output::write(path, self.force, |to| table::write(plan, cells, to))?;
         }
         if let Some(path) = &self.figure {
-            let mut output = Output::create(path, self.force)?;
-            output
-                .writer()
-                .write_all(motion_map(plan, cells)?.as_bytes())?;
-            output.finish()?;
+            write_text(path, &motion_map(plan, cells)?, self.force)?;
         }
         Ok(())
     }
@@ -272,10 +324,10 @@ fn show(plan: &Plan, cells: &[Cell]) {
             100.0 * count as f64 / cells.len() as f64
         };
         say!(
-            "{:?} dither, {:?} start, {} cells: {:.1} % at rest, {:.1} % periodic, {:.1} % chaos, {:.1} % undecided, {:.1} % diverge",
+            "{:?} dither, {:?} start, {}: {:.1} % at rest, {:.1} % periodic, {:.1} % chaos, {:.1} % undecided, {:.1} % diverge",
             sheet.waveform,
             sheet.start,
-            cells.len(),
+            counted(cells.len(), "cell"),
             share(Kind::Equilibrium),
             share(Kind::Periodic),
             share(Kind::Chaos),

@@ -1,12 +1,8 @@
 //! One file a subcommand, and what they share: exit codes, configuration options, output files.
 
-/// Prints a line. A reader that has seen enough of it and closes the pipe (`| head`) is no fault, and ends nothing.
-macro_rules! say {
-    ($($line:tt)*) => {{
-        use std::io::Write as _;
-        writeln!(std::io::stdout(), $($line)*).ok();
-    }};
-}
+// First, for its macro.
+#[macro_use]
+mod stdout;
 
 mod averaging;
 mod basin;
@@ -38,13 +34,16 @@ mod tires;
 mod verify;
 
 use clap::{Args, Parser, Subcommand};
+use output::{Named, named};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::settings::Choice;
-use sim_host::config::{ConfigError, differences, load, validate};
+use sim_host::config::{ConfigError, differences, over_preset, read, validate};
 use sim_host::interrupt;
 use sim_host::motion::Reason;
-use std::path::PathBuf;
+use sim_host::words::Short;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration;
 
@@ -105,19 +104,19 @@ enum Done {
 
 /// Runs the command line.
 pub fn main() -> ExitCode {
-    let command = Cli::parse().command;
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(usage) => return show(&usage),
+    };
     if let Err(error) = ctrlc::set_handler(end_soon) {
         eprintln!("warning: Ctrl-C ends this program at once: {error}");
     }
-    let done = interrupt::catch(|| run(command));
-    match done.unwrap_or_else(|interrupted| Err(interrupted.into())) {
+    let done = interrupt::catch(|| run(command)).unwrap_or_else(|stopped| Err(stopped.into()));
+    match done.and_then(|done| stdout::finish().map(|()| done)) {
         Ok(Done::Well) => ExitCode::SUCCESS,
         Ok(Done::Failed) => ExitCode::from(FAILED),
         Ok(Done::Code(code)) => ExitCode::from(code),
-        Err(error) => {
-            eprintln!("error: {}", message(&error));
-            ExitCode::from(COULD_NOT_RUN)
-        }
+        Err(error) => could_not_run(&error),
     }
 }
 
@@ -163,6 +162,22 @@ fn run(command: Command) -> anyhow::Result<Done> {
     }
 }
 
+fn could_not_run(error: &anyhow::Error) -> ExitCode {
+    eprintln!("error: {}", message(error));
+    ExitCode::from(COULD_NOT_RUN)
+}
+
+/// Shows a help text, or what is wrong with the command line.
+fn show(usage: &clap::Error) -> ExitCode {
+    let code = ExitCode::from(usage.exit_code() as u8);
+    match usage.print() {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            could_not_run(&anyhow::Error::new(error).context("cannot write to standard output"))
+        }
+        _ => code,
+    }
+}
+
 /// The error and its causes, each once: some say their cause themselves, others leave that to the chain.
 fn message(error: &anyhow::Error) -> String {
     let mut message = String::new();
@@ -188,13 +203,17 @@ struct ConfigOptions {
 }
 
 impl ConfigOptions {
-    /// The scenario. Of a file it is said in which parameters it differs from the paper's.
+    /// The scenario.
     fn load(&self) -> Result<Scenario<f64>, ConfigError> {
-        let scenario = load(self.config.as_deref(), self.preset.as_deref())?;
-        if self.config.is_some() {
-            say_differences(&scenario);
+        match &self.config {
+            Some(file) => load_file(file, self.preset.as_deref()),
+            None => over_preset(toml::Table::new(), self.preset.as_deref()),
         }
-        Ok(scenario)
+    }
+
+    /// The file that is read, if any.
+    fn input(&self) -> Option<Named<'_>> {
+        named("--config", &self.config)
     }
 
     /// As they are given on a command line, each with a blank before it.
@@ -206,8 +225,17 @@ impl ConfigOptions {
     }
 }
 
-fn say_differences(scenario: &Scenario<f64>) {
-    let differences = differences(scenario);
+/// The scenario of a file. It is said in which parameters it differs from the paper's, and if the file holds none.
+fn load_file(file: &Path, preset: Option<&str>) -> Result<Scenario<f64>, ConfigError> {
+    let over = read(file)?;
+    if sets_nothing(&over) {
+        eprintln!(
+            "warning: {} sets no parameter, so all are the preset's; `sim-host config` prints a complete file",
+            file.display()
+        );
+    }
+    let scenario = over_preset(over, preset)?;
+    let differences = differences(&scenario);
     if differences.is_empty() {
         eprintln!("parameters: the paper's");
     } else {
@@ -216,6 +244,14 @@ fn say_differences(scenario: &Scenario<f64>) {
             differences.join(", ")
         );
     }
+    Ok(scenario)
+}
+
+/// Whether a file holds nothing, or sections with nothing in them.
+fn sets_nothing(table: &toml::Table) -> bool {
+    table
+        .values()
+        .all(|value| value.as_table().is_some_and(sets_nothing))
 }
 
 /// What to do about a motion that ends early.
@@ -278,7 +314,8 @@ const TIME_OUTS_S: std::ops::RangeInclusive<f64> = 0.1..=86_400.0;
 fn time_out(seconds: f64) -> anyhow::Result<Duration> {
     anyhow::ensure!(
         TIME_OUTS_S.contains(&seconds),
-        "--time-out {seconds}: must be from {} to {} s",
+        "--time-out {}: must be from {} to {} s",
+        Short(seconds),
         TIME_OUTS_S.start(),
         TIME_OUTS_S.end()
     );

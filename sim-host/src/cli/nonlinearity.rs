@@ -15,7 +15,8 @@ use sim_host::config::validate;
 #[command(after_help = "Examples:
   sim-host nonlinearity --dither square --amplitude-v 0.1 --figure figs9-11.svg
   sim-host nonlinearity --dither sine --amplitude-v 1 --figure figs14-16.svg
-  sim-host nonlinearity --dither sine --amplitude-v 1 --max 0.2 --out n.csv")]
+  sim-host nonlinearity --dither sine --amplitude-v 1 --max 0.2 \\
+      --out nonlinearity.csv")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,
@@ -57,7 +58,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         "there is no dither: give --dither square or --dither sine, and --amplitude-v greater than 0"
     );
     let greatest = greatest_angle("--max", arguments.max)?;
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.config.input())?;
     let rows = nonlinearities(&scenario, greatest);
     let results = Results {
         waveform: scenario.dither.waveform,

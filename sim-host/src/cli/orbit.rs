@@ -12,6 +12,7 @@ use sim_host::chaos::orbit::{Outcome, Point, Section, Start, diagram};
 use sim_host::chaos::sweep::{Parameter, Timing};
 use sim_host::component::Component;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::counted;
 
 /// Orbit diagram (bifurcation diagram): maxima of the yaw rate, or crossings of a section, over wheel speed or dither
 /// amplitude.
@@ -20,10 +21,14 @@ use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 /// dither is averaged and on from the start. Motions that diverge are named as such and have no values.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host orbit --from 1600 --to 1900 --step 1 --out orbit.csv --figure orbit.svg      the paper's Figure 6
-  sim-host orbit --over amplitude --dither square --rpm 1750 --figure square.svg        Figure 8
-  sim-host orbit --over amplitude --dither sine --from 0 --to 1.4 --step 0.005 --figure sine.svg
-  sim-host orbit --start down --section steering-rate --level 0 --out down.csv")]
+  sim-host orbit --from 1600 --to 1900 --step 1 \\
+      --out orbit.csv --figure orbit.svg    # the paper's Figure 6
+  sim-host orbit --over amplitude --dither square --rpm 1750 \\
+      --figure orbit-square.svg             # Figure 8
+  sim-host orbit --over amplitude --dither sine --from 0 --to 1.4 --step 0.005 \\
+      --figure orbit-sine.svg
+  sim-host orbit --start down --section steering-rate --level 0 \\
+      --out orbit-down.csv")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
@@ -127,7 +132,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         StartOption::Up => (Start::Up, 1),
         StartOption::Down => (Start::Down, 1),
     };
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.config.input())?;
     let announced = &arguments.transient;
     announced.announce(values.count(), timing, &scenario, at_once)?;
     let points = with_progress(values.count(), |watch| {
@@ -190,8 +195,8 @@ fn summary(results: &Results) -> String {
         _ => None,
     });
     format!(
-        "{} values of {}: {met} meet the section, {rests} come to rest, {misses} miss it, {diverges} diverge{}",
-        results.points.len(),
+        "{} of {}: the section is met at {met}, missed at {misses}; {rests} at rest, {diverges} diverging{}",
+        counted(results.points.len(), "value"),
         results.parameter.name(),
         not_followed.unwrap_or_default()
     )

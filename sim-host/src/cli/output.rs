@@ -1,109 +1,42 @@
-//! Output files: never overwritten unasked, never left half written.
+//! What the subcommands share that write files: their options, and the checks before the work begins.
 
-use anyhow::{Context, bail};
+use super::stdout;
 use clap::Args;
 use serde::Serialize;
-use std::fs::File;
-use std::io::{BufWriter, Write};
+use sim_host::output::{Outputs, write_json, write_rows, write_text};
 use std::path::{Path, PathBuf};
-use tempfile::NamedTempFile;
 
-/// Refuses an output that is there already, before any work is done for it.
-pub fn check_free(path: &Path, force: bool) -> anyhow::Result<()> {
-    if path.exists() && !force {
-        bail!("{} exists; give --force to overwrite it", path.display());
-    }
-    Ok(())
+/// A file or folder, and the option that names it.
+pub type Named<'a> = (&'static str, &'a Path);
+
+/// The file of an option, if it was given.
+pub fn named<'a>(option: &'static str, file: &'a Option<PathBuf>) -> Option<Named<'a>> {
+    file.as_deref().map(|file| (option, file))
 }
 
-/// The same of all outputs that were asked for.
-pub fn check_all_free<'a>(
-    files: impl IntoIterator<Item = &'a Option<PathBuf>>,
+/// Checks the files that a job is to write, before its work begins; those that it reads must not be among them.
+pub fn check<'a>(
+    inputs: impl IntoIterator<Item = Named<'a>>,
+    files: impl IntoIterator<Item = Option<Named<'a>>>,
     force: bool,
-) -> anyhow::Result<()> {
-    let mut paths = files.into_iter().flatten();
-    paths.try_for_each(|path| check_free(path, force))
-}
-
-/// A file that takes its name only when it is complete.
-pub struct Output<'a> {
-    path: &'a Path,
-    writer: BufWriter<NamedTempFile<File>>,
-}
-
-impl<'a> Output<'a> {
-    /// Begins a file at `path`.
-    pub fn create(path: &'a Path, force: bool) -> anyhow::Result<Self> {
-        check_free(path, force)?;
-        let folder = match path.parent() {
-            Some(parent) if parent != Path::new("") => parent,
-            _ => Path::new("."),
-        };
-        let file =
-            temporary(folder).with_context(|| format!("cannot write into {}", folder.display()))?;
-        let writer = BufWriter::new(file);
-        Ok(Self { path, writer })
+) -> anyhow::Result<Outputs> {
+    let mut outputs = Outputs::new(force);
+    for (option, path) in inputs {
+        outputs.reads(option, path);
     }
-
-    /// Where its bytes go.
-    pub fn writer(&mut self) -> &mut impl Write {
-        &mut self.writer
+    for (option, path) in files.into_iter().flatten() {
+        outputs.file(option, path)?;
     }
-
-    /// Completes the file.
-    pub fn finish(self) -> anyhow::Result<()> {
-        let failed = || format!("cannot write {}", self.path.display());
-        let file = self.writer.into_inner().with_context(failed)?;
-        file.persist(self.path).with_context(failed)?;
-        Ok(())
+    if outputs.data_on_stdout() {
+        stdout::leave_to_data();
     }
-}
-
-/// A temporary file beside the output, with the permissions that any new file has.
-fn temporary(folder: &Path) -> std::io::Result<NamedTempFile<File>> {
-    use std::os::unix::fs::PermissionsExt;
-    let any = std::fs::Permissions::from_mode(0o666);
-    tempfile::Builder::new()
-        .permissions(any)
-        .tempfile_in(folder)
-}
-
-/// Writes a text.
-pub fn write_text(path: &Path, text: &str, force: bool) -> anyhow::Result<()> {
-    let mut output = Output::create(path, force)?;
-    output.writer().write_all(text.as_bytes())?;
-    output.finish()
-}
-
-/// Writes results as JSON.
-pub fn write_json(path: &Path, results: &impl Serialize, force: bool) -> anyhow::Result<()> {
-    write_text(
-        path,
-        &(serde_json::to_string_pretty(results)? + "\n"),
-        force,
-    )
-}
-
-/// Writes rows as CSV, the columns named as their fields are.
-pub fn write_rows(
-    path: &Path,
-    rows: impl IntoIterator<Item = impl Serialize>,
-    force: bool,
-) -> anyhow::Result<()> {
-    let mut output = Output::create(path, force)?;
-    let mut csv = csv::Writer::from_writer(output.writer());
-    for row in rows {
-        csv.serialize(row)?;
-    }
-    csv.flush()?;
-    drop(csv);
-    output.finish()
+    Ok(outputs)
 }
 
 /// Where an analysis writes its results. Without any, a summary is all there is.
 #[derive(Args)]
 pub struct Destinations {
-    /// Write the results as CSV
+    /// Write the results as CSV; `-` is standard output, here and for all files
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Write the results as JSON
@@ -118,9 +51,18 @@ pub struct Destinations {
 }
 
 impl Destinations {
-    /// Refuses files that are there already, before any work is done for them.
-    pub fn check_free(&self) -> anyhow::Result<()> {
-        check_all_free([&self.out, &self.json, &self.figure], self.force)
+    /// The files that were asked for.
+    pub fn files(&self) -> [Option<Named<'_>>; 3] {
+        [
+            named("--out", &self.out),
+            named("--json", &self.json),
+            named("--figure", &self.figure),
+        ]
+    }
+
+    /// Checks them before the work begins.
+    pub fn check<'a>(&'a self, inputs: impl IntoIterator<Item = Named<'a>>) -> anyhow::Result<()> {
+        check(inputs, self.files(), self.force).map(drop)
     }
 
     /// Writes the rows as CSV, all results as JSON, and the figure: each if it was asked for.

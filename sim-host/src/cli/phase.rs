@@ -10,9 +10,11 @@ use sim_host::report::chart::{Chart, Look, Panel};
 /// Phase portrait of the settled motion: one component of the state against another.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host phase --rpm 1750 --figure chaos.svg
-  sim-host phase --rpm 1750 --dither square --amplitude-v 0.1 --figure fig12a.svg
-  sim-host phase --x steering_angle --y steering_rate --time 60 --out orbit.csv --figure orbit.svg
+  sim-host phase --rpm 1750 --figure phase.svg
+  sim-host phase --rpm 1750 --dither square --amplitude-v 0.1 \\
+      --figure fig12a.svg
+  sim-host phase --x steering_angle --y steering_rate --time 60 \\
+      --out phase-steering.csv --figure phase-steering.svg
 
 Components: sideslip (beta), yaw_rate (gamma), steering_angle (delta_f), steering_rate (delta_f_dot).")]
 pub struct Arguments {
@@ -55,7 +57,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         x != y,
         "--x and --y are both {x}: must be different components"
     );
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.input())?;
     let trace = arguments.run.trace(&scenario)?;
     let rows: Vec<Row> = trace
         .states

@@ -1,6 +1,6 @@
 //! `sim-host pil`: manoeuvres with the ECU in the loop.
 
-use super::output::{Destinations, Output, check_all_free, write_json, write_rows, write_text};
+use super::output::{Destinations, check, named};
 use super::{Done, time_out, waveform};
 use anyhow::{Context, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -14,10 +14,12 @@ use sim_host::closed_loop::profile::Profile;
 use sim_host::closed_loop::recording::{MAGIC, Recording};
 use sim_host::closed_loop::run::{Comparison, Depth, compare};
 use sim_host::config::validate;
+use sim_host::output::{self, write_json, write_rows, write_text};
 use sim_host::pil::elf::Image;
 use sim_host::pil::qemu::Machine;
 use sim_host::pil::session::LinkKind;
 use sim_host::report;
+use sim_host::words::{counted, counted_as};
 use std::path::{Path, PathBuf};
 
 /// Drive manoeuvres with the ECU in the loop: as a model, as software on this host, and as firmware in QEMU; compare the three
@@ -32,12 +34,13 @@ use std::path::{Path, PathBuf};
     mut_arg("figure", |arg| arg.help("Draw the manoeuvre as an SVG figure"))
 )]
 #[command(after_help = "Examples:
-  sim-host pil                                            1750 rpm, square dither from 3 s
+  sim-host pil              # 1750 rpm, square dither from 3 s
   sim-host pil --rpm 1880 --dither sine --figure pil.svg
-  sim-host pil --scenario examples/manoeuvres/speed-ramp.toml --record ramp.loop --out ramp.csv
-  sim-host pil --replay ramp.loop                         the same again without QEMU
-  sim-host pil --scenario examples/manoeuvres/*.toml      a table over all of them
-  sim-host pil --link uart --time 1                       over the board's UART: realistic, and slow")]
+  sim-host pil --scenario examples/manoeuvres/speed-ramp.toml \\
+      --record ramp.loop --out ramp.csv
+  sim-host pil --replay ramp.loop       # the same again without QEMU
+  sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
+  sim-host pil --link uart --time 1     # the board's UART: realistic, slow")]
 pub struct Arguments {
     /// Manoeuvres, as TOML files [default: constant speed of 1750 rpm, square dither from 3 s, 20 s]
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -77,7 +80,7 @@ pub struct Arguments {
     time_out: f64,
 }
 
-const USUAL: &str = include_str!("../../../examples/manoeuvres/constant-speed.toml");
+const USUAL: &str = include_str!("../../examples/manoeuvres/constant-speed.toml");
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     if let Some(file) = &arguments.replay {
@@ -154,24 +157,19 @@ impl Arguments {
 
     /// Refuses what cannot be written, before any work is done for it.
     fn check_outputs(&self, manoeuvres: usize) -> anyhow::Result<()> {
-        let of_one = [
-            ("--record", &self.record),
-            ("--out", &self.files.out),
-            ("--figure", &self.files.figure),
-        ];
-        for (option, path) in of_one {
+        let [out, json, figure] = self.files.files();
+        let of_one = [named("--record", &self.record), out, figure];
+        for (option, _) in of_one.into_iter().flatten() {
             ensure!(
-                path.is_none() || manoeuvres == 1,
+                manoeuvres == 1,
                 "{option}: takes one manoeuvre, and there are {manoeuvres}; give one --scenario"
             );
         }
-        let files = [
-            &self.record,
-            &self.files.out,
-            &self.files.figure,
-            &self.files.json,
-        ];
-        check_all_free(files, self.files.force)
+        let scenarios = self.scenario.iter();
+        let firmware = ("--firmware", self.firmware.as_path());
+        let inputs = scenarios.map(|file| ("--scenario", file.as_path()));
+        let files = of_one.into_iter().chain([json]);
+        check(inputs.chain([firmware]), files, self.files.force).map(drop)
     }
 
     fn write(
@@ -186,9 +184,7 @@ impl Arguments {
                 scenario: ecu_scenario(scenario, manoeuvre),
                 exchanges: run.exchanges.clone(),
             };
-            let mut output = Output::create(path, self.files.force)?;
-            recording.write(output.writer())?;
-            output.finish()?;
+            output::write(path, self.files.force, |to| Ok(recording.write(to)?))?;
         }
         if let Some(path) = &self.files.out {
             write_rows(path, &run.records, self.files.force)?;
@@ -324,9 +320,9 @@ fn replay(file: &Path) -> anyhow::Result<Done> {
     let replayed = recording.replay().with_context(|| name.to_string())?;
     let comparison = compare(&recording.exchanges, &replayed, Depth::Bytes);
     say!(
-        "{} duties and {} actuator frames replayed: {}",
-        comparison.duties,
-        comparison.frames,
+        "{} and {} replayed: {}",
+        counted_as(comparison.duties, "duty", "duties"),
+        counted(comparison.frames, "actuator frame"),
         words(&comparison)
     );
     Ok(if comparison.is_equal() {

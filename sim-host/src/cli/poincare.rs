@@ -9,13 +9,16 @@ use serde::Serialize;
 use sim_host::chaos::poincare::{Crossing, Direction, Section, crossings, range};
 use sim_host::component::Component;
 use sim_host::report::chart::{Chart, Look, Panel};
+use sim_host::words::counted;
 
 /// Poincaré section of the settled motion: its states where one component passes a value.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host poincare --rpm 1750 --time 2000 --figure poincare.svg
-  sim-host poincare --rpm 1840 --section yaw_rate --at 0 --direction rising --out period3.csv
-  sim-host poincare --section sideslip --x yaw_rate --y steering_rate --time 500 --figure section.svg
+  sim-host poincare --rpm 1840 --section yaw_rate --at 0 --direction rising \\
+      --out period3.csv
+  sim-host poincare --section sideslip --x yaw_rate --y steering_rate \\
+      --time 500 --figure section.svg
 
 Components: sideslip (beta), yaw_rate (gamma), steering_angle (delta_f), steering_rate (delta_f_dot).")]
 pub struct Arguments {
@@ -118,7 +121,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     if let Some(at) = arguments.at {
         ensure!(at.is_finite(), "--at {at}: must be a finite number");
     }
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.input())?;
     let component = arguments.section;
     let value = match arguments.at {
         Some(value) => value,
@@ -160,13 +163,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             Chart {
                 heading: format!("Poincar\u{e9} section \u{2013} {}", title(&scenario)),
                 panels: vec![Panel {
-                    caption: format!("{} crossings of {section:.4}", found.len()),
+                    caption: format!("{} of {section:.4}", counted(found.len(), "crossing")),
                     ..Panel::of_states((x, y), states, Look::Dots)
                 }],
             }
             .svg()
         })?;
-    say!("{} crossings of {section}", found.len());
+    say!("{} of {section}", counted(found.len(), "crossing"));
     if let Some(time_s) = results.mean_return_time_s {
         say!("mean time between them {time_s:.6} s");
     }

@@ -1,6 +1,7 @@
 //! `sim-host qemu`: the cargo runner of the firmware.
 
 use super::Done;
+use super::output::check;
 use anyhow::{Context, anyhow, ensure};
 use shared_model::Scenario;
 use shared_model::settings::SettingError;
@@ -16,10 +17,13 @@ use toml::{Table, Value};
 /// Run a firmware image in QEMU: show its log, pass its exit code on, and end with it.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples (cargo runs this from firmware/, so `cargo run -- SETTINGS` is the short form):
-  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu run.wheel_speed_rpm=1600
-  sim-host qemu ecu dither.waveform=sine dither.amplitude_v=1 telemetry=run.bin
-  sim-host qemu --machine mps2-an500 --time-out 60 ecu run.duration_s=5
+    after_help = "Examples (cargo runs this from firmware/: `cargo run -- SETTINGS`):
+  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+      run.wheel_speed_rpm=1600
+  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+      dither.waveform=sine dither.amplitude_v=1 telemetry=run.bin
+  sim-host qemu --machine mps2-an500 --time-out 60 \\
+      target/thumbv7em-none-eabihf/firmware/ecu run.duration_s=5
 
 Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME and telemetry=FILE.
 Exit codes are the firmware's: 0 complete, as its log and its telemetry say too; 10 scenario refused, 11 telemetry, 12 overrun, 13 panic, 14 hard fault, 15
@@ -32,6 +36,9 @@ pub struct Arguments {
     /// Longest time that the run may take, s
     #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
     time_out: f64,
+    /// Overwrite the telemetry file if it exists
+    #[arg(long)]
+    force: bool,
     /// Firmware image (ELF)
     image: PathBuf,
     /// Settings, `key=value`, after the image
@@ -59,6 +66,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             }
         );
     }
+    check_destination(arguments)?;
     let before = telemetry(arguments).and_then(written);
     let show = |line: &str| say!("{line}");
     let finished = qemu::run_with(
@@ -151,5 +159,20 @@ fn check_telemetry(file: &Path, before: Option<SystemTime>) -> anyhow::Result<()
         "the run ended with exit code 0, but its telemetry {name} says {}; run it again",
         trailer.exit_code
     );
+    Ok(())
+}
+
+/// The firmware overwrites what is there without asking, so it is asked here.
+fn check_destination(arguments: &Arguments) -> anyhow::Result<()> {
+    if let Some(file) = telemetry(arguments) {
+        let image = ("the image", arguments.image.as_path());
+        let outputs = check([image], [Some(("telemetry", file))], arguments.force)
+            .context("nothing was run; --force goes before the image")?;
+        ensure!(
+            !outputs.data_on_stdout() && !file.to_string_lossy().starts_with(':'),
+            "telemetry={}: it would get among the log; give the name of a file",
+            file.display()
+        );
+    }
     Ok(())
 }

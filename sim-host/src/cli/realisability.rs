@@ -7,13 +7,16 @@ use serde::Serialize;
 use shared_model::dither::Waveform;
 use sim_host::config::validate;
 use sim_host::realisability::{Amplitudes, Demand, Response, bode_chart, demands, responses};
+use sim_host::words::Short;
 
 /// What the steering actuator passes of the dither (Bode diagram), the torque that the dither's amplitude would need, and the
 /// amplitude that the motor reaches, from 1 to 20,000 rad/s.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host realisability --figure bode.svg
-  sim-host realisability --square-v 0.05 --sine-v 0.8 --out actuator.csv --json actuator.json
+  sim-host realisability --square-v 0.05 --sine-v 0.8 \\
+      --out actuator.csv --json actuator.json
+  sim-host config > vehicle.toml
   sim-host realisability --config vehicle.toml")]
 pub struct Arguments {
     #[command(flatten)]
@@ -53,7 +56,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     ] {
         ensure!(
             volts > 0.0 && volts <= 1000.0,
-            "{option} {volts}: must be greater than 0 and at most 1000 V"
+            "{option} {}: must be greater than 0 and at most 1000 V",
+            Short(volts)
         );
     }
     let amplitudes = Amplitudes::from_volts(&scenario, arguments.square_v, arguments.sine_v);
@@ -63,7 +67,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         scenario.dither.square_rad_per_volt,
         scenario.dither.sine_rad_per_volt
     );
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.config.input())?;
     let rows = responses(&scenario, &amplitudes);
     let results = Results {
         demands: demands(&scenario, &amplitudes),

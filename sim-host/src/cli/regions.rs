@@ -11,6 +11,7 @@ use shared_model::Scenario;
 use sim_host::chaos::regions::{Regions, Sample, coexisting, regions};
 use sim_host::chaos::sweep::{Parameter, Timing, mirrored};
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::{Short, counted};
 
 /// Kinds of motion (equilibrium, period-n, chaos) over wheel speed or dither amplitude, with each edge between them bisected.
 ///
@@ -20,9 +21,12 @@ use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 /// steering angle; attractors that coexist are named.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host regions --from 1600 --to 1900 --step 5 --figure regions.svg        the paper's regions I to IV
-  sim-host regions --from 1820 --to 1860 --step 1 --width 0.1 --transient 1000 --time 2000 --json regions.json
-  sim-host regions --over amplitude --dither square --from 0 --to 0.14 --step 0.002 --out square.csv")]
+  sim-host regions --from 1600 --to 1900 --step 5 \\
+      --figure regions.svg                  # the paper's regions I to IV
+  sim-host regions --from 1820 --to 1860 --step 1 --width 0.1 \\
+      --transient 1000 --time 2000 --json regions.json
+  sim-host regions --over amplitude --dither square \\
+      --from 0 --to 0.14 --step 0.002 --out regions-square.csv")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
@@ -84,10 +88,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let width = arguments.width.unwrap_or(parameter.edge_width());
     ensure!(
         width >= LEAST_WIDTH && width.is_finite(),
-        "--width {width}: must be a finite number of at least {LEAST_WIDTH} {}",
+        "--width {}: must be a finite number of at least {LEAST_WIDTH} {}",
+        Short(width),
         parameter.unit()
     );
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.config.input())?;
     let runs = 2 * values.count();
     let announced = &arguments.transient;
     announced.announce(runs, timing, &scenario, side_by_side())?;
@@ -176,8 +181,8 @@ fn show(results: &Results) {
     let at = &results.coexisting_at;
     match (at.first(), at.last()) {
         (Some(first), Some(last)) => say!(
-            "two attractors coexist at {} values from {first} to {last} {unit}",
-            at.len()
+            "two attractors coexist at {} from {first} to {last} {unit}",
+            counted(at.len(), "value")
         ),
         _ => say!("both starts end on the same attractor at every value"),
     }

@@ -1,12 +1,13 @@
 //! `sim-host reproduce`: the paper's figures and claims.
 
 use super::Done;
+use super::output::{check, named};
 use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::settings::Choice;
 use shared_model::{Preset, Scenario};
-use sim_host::config::{load, validate};
+use sim_host::config::validate;
 use sim_host::interrupt;
-use sim_host::reproduce::{Judgement, Options, Progress, Quality, Summary, reproduce};
+use sim_host::reproduce::{CLAIMS, Judgement, Options, Progress, Quality, Summary, reproduce};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -16,8 +17,9 @@ use std::time::{Duration, Instant};
 /// judged instead of the presets.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host reproduce --quick                        a look at everything in seconds
-  sim-host reproduce                                full quality, in target/reproduction
+  sim-host reproduce --quick    # everything in seconds
+  sim-host reproduce            # full quality, in target/reproduction
+  sim-host config > vehicle.toml
   sim-host reproduce --config vehicle.toml --out target/vehicle")]
 pub struct Arguments {
     /// Coarse sweeps and short runs
@@ -29,6 +31,9 @@ pub struct Arguments {
     /// Folder for page, figures and data
     #[arg(long, value_name = "FOLDER", default_value = "target/reproduction")]
     out: PathBuf,
+    /// Write into a folder that holds other files than a reproduction's
+    #[arg(long)]
+    force: bool,
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
@@ -40,6 +45,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         },
         scenarios: scenarios(arguments)?,
     };
+    check_folder(arguments)?;
     let start = Instant::now();
     let bar = ProgressBar::no_length().with_style(
         ProgressStyle::with_template("{elapsed_precise} {spinner} {msg}, {pos} points")
@@ -89,6 +95,20 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     Ok(Done::Well)
 }
 
+/// Refuses a folder with other files, which those of a reproduction might overwrite.
+fn check_folder(arguments: &Arguments) -> anyhow::Result<()> {
+    let folder = &arguments.out;
+    let inputs = named("--config", &arguments.config);
+    check(inputs, [], arguments.force)?.folder("--out", folder)?;
+    let is_empty = std::fs::read_dir(folder).map_or(true, |mut files| files.next().is_none());
+    anyhow::ensure!(
+        is_empty || folder.join(CLAIMS).exists() || arguments.force,
+        "{} holds other files than a reproduction's; give another --out, or --force to write among them",
+        folder.display()
+    );
+    Ok(())
+}
+
 /// What is left at the pace so far, once a twentieth is done.
 fn time_left(elapsed: Duration, done: f64) -> String {
     if done < 0.05 {
@@ -100,9 +120,8 @@ fn time_left(elapsed: Duration, done: f64) -> String {
 
 fn scenarios(arguments: &Arguments) -> anyhow::Result<Vec<(String, Scenario<f64>)>> {
     if let Some(file) = &arguments.config {
-        let scenario = load(Some(file), None)?;
+        let scenario = super::load_file(file, None)?;
         validate(&scenario)?;
-        super::say_differences(&scenario);
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         let plain = |c: char| {
             if c.is_ascii_alphanumeric() {

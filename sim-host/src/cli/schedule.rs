@@ -1,7 +1,7 @@
 //! `sim-host schedule`: the amplitude of dither that each wheel speed needs, as the table that the ECU carries.
 
 use super::grid::{GridOptions, TimeOptions};
-use super::output::{check_all_free, write_json, write_rows, write_text};
+use super::output::{check, named};
 use super::sweep::with_progress;
 use super::{ConfigOptions, Done};
 use anyhow::{Context, anyhow, bail, ensure};
@@ -12,10 +12,12 @@ use sim_host::chaos::sweep::{Timing, Values};
 use sim_host::config::{differences, validate};
 use sim_host::map::cell::Cell as MapCell;
 use sim_host::map::plan::Plan as MapPlan;
+use sim_host::output::{write_json, write_rows, write_text};
 use sim_host::report::schedule_map;
 use sim_host::schedule::choose::Choice;
 use sim_host::schedule::map::Cell;
 use sim_host::schedule::{Analysis, Plan, from_map, runs, schedule, table};
+use sim_host::words::{Short, counted};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -29,31 +31,31 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 // Finer and longer than a map for the eye.
 #[command(
+    mut_arg("step", |arg| arg.default_value("25")),
     mut_arg("square_to", |arg| arg.default_value("0.15")),
     mut_arg("sine_to", |arg| arg.default_value("1.35")),
     mut_arg("transient", |arg| arg.default_value("150"))
 )]
 #[command(after_help = "Examples:
-  sim-host schedule --figure schedule.svg --csv map.csv
-  sim-host schedule --config heavier.toml --from 1400 --step 50 --margin 0.5 --json schedule.json
-  sim-host map --start both --speeds 41 --amplitudes 31 --square-to 0.15 --sine-to 1.35 --transient 150 --parquet map.parquet
-  sim-host schedule --map map.parquet        the same schedule from that map
-  sim-host schedule --out shared-model/src/schedule_table.rs --force       the table of the ECU, then build the firmware")]
+  sim-host schedule --from 1700 --to 1800 \\
+      --csv schedule.csv --figure schedule.svg
+  sim-host config > vehicle.toml
+  sim-host schedule --config vehicle.toml --from 1500 --to 1600 --step 50 \\
+      --margin 0.5 --json schedule.json
+  # the cells of the grid from a map
+  sim-host map --start both --from 1700 --to 1800 --step 25 --square-to 0.15 \\
+      --sine-to 1.35 --amplitudes 31 --transient 150 --parquet known.parquet
+  sim-host schedule --from 1700 --to 1800 --map known.parquet
+  # the ECU's table, for shared-model/src; then build the firmware
+  sim-host schedule --out schedule_table.rs")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,
     #[command(flatten)]
     grid: GridOptions,
-    /// Step of the wheel speed, rpm
-    #[arg(
-        long,
-        value_name = "RPM",
-        default_value_t = 25.0,
-        allow_negative_numbers = true
-    )]
-    step: f64,
-    /// Steps from 0 to the greatest amplitude; edges are bisected to a sixteenth of a step
-    #[arg(long, value_name = "COUNT", default_value_t = 30, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    /// Equal steps from 0 to the greatest amplitude, instead of --square-step and --sine-step; edges are bisected to a sixteenth of
+    /// a step
+    #[arg(long, value_name = "COUNT", default_value_t = 30, conflicts_with_all = ["square_step", "sine_step"], value_parser = clap::value_parser!(u32).range(2..=1000))]
     amplitudes: u32,
     /// How far above the least amplitude an entry lies, as a share of its range from 0 to 1; at least half a PWM count
     #[arg(
@@ -86,6 +88,8 @@ pub struct Arguments {
     force: bool,
 }
 
+/// Amplitudes of a schedule, 0 among them.
+const AMPLITUDES: std::ops::RangeInclusive<usize> = 3..=1001;
 /// An edge is bisected to this share of the step between amplitudes.
 const EDGE_SHARE: f64 = 1.0 / 16.0;
 
@@ -115,12 +119,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         arguments.plan(&scenario, Waveform::Sine)?,
     ];
     let files = [
-        &arguments.out,
-        &arguments.csv,
-        &arguments.json,
-        &arguments.figure,
+        named("--out", &arguments.out),
+        named("--csv", &arguments.csv),
+        named("--json", &arguments.json),
+        named("--figure", &arguments.figure),
     ];
-    check_all_free(files, arguments.force)?;
+    let map = named("--map", &arguments.map);
+    check(
+        arguments.config.input().into_iter().chain(map),
+        files,
+        arguments.force,
+    )?;
     let first_cells = arguments.first_cells(&scenario, &plans)?;
     let mut analyses = Vec::new();
     for ((scenario, plan), first) in plans.into_iter().zip(first_cells) {
@@ -153,17 +162,27 @@ impl Arguments {
         ensure!(
             (0.0..=1.0).contains(&self.margin),
             "--margin {}: must be a share from 0 to 1",
-            self.margin
+            Short(self.margin)
         );
-        let what = match waveform {
-            Waveform::Sine => "amplitude of the sine (V)",
-            Waveform::Square | Waveform::None => "amplitude of the square wave (V)",
+        let (what, to_v, step_v) = self.grid.amplitudes_v(waveform);
+        let amplitudes_v = match step_v {
+            Some(step_v) => Values::new(what, 0.0, to_v, step_v)?,
+            None => Values::parts(what, to_v, self.amplitudes as usize)?,
         };
-        let to_v = self.grid.amplitude_to_v(waveform);
-        let step_v = to_v / f64::from(self.amplitudes);
+        let step_v = step_v.unwrap_or(to_v / f64::from(self.amplitudes));
+        ensure!(
+            AMPLITUDES.contains(&amplitudes_v.count()) && to_v > 0.0,
+            "{what}: {} from 0 to {} in steps of {}: must be {} to {}, ascending",
+            counted(amplitudes_v.count(), "value"),
+            Short(to_v),
+            Short(step_v),
+            AMPLITUDES.start(),
+            AMPLITUDES.end()
+        );
+        let (from, to) = (self.grid.from, self.grid.to);
         let plan = Plan {
-            speeds_rpm: Values::new("wheel speed (rpm)", self.grid.from, self.grid.to, self.step)?,
-            amplitudes_v: Values::new(what, 0.0, to_v, step_v)?,
+            speeds_rpm: Values::new("wheel speed (rpm)", from, to, self.step_rpm())?,
+            amplitudes_v,
             edge_width_v: EDGE_SHARE * step_v,
             margin: self.margin,
             timing: self.times.timing()?,
@@ -187,7 +206,7 @@ impl Arguments {
         let fitting = from_map::fitting(scenario, square, sine)
             .context("no map fits this schedule, so leave --map out")?;
         let (map, cells) = self.read_map(path, &fitting).map_err(|error| {
-            let command = self.map_command(path, &fitting);
+            let command = self.map_command(path);
             anyhow!(
                 "cannot use {}: {error:#}; this makes one that fits: `{command}`",
                 path.display()
@@ -205,25 +224,51 @@ impl Arguments {
     }
 
     /// The command that makes a map: at `path`, unless there is something already.
-    fn map_command(&self, path: &Path, map: &MapPlan) -> String {
+    fn map_command(&self, path: &Path) -> String {
         let path = if path.exists() {
             Path::new("fitting.parquet")
         } else {
             path
         };
-        let (speeds, amplitudes) = (&map.speeds_rpm, &map.sheets[0].amplitudes_v);
         format!(
-            "sim-host map{} --start both --from {} --to {} --speeds {} --square-to {} --sine-to {} --amplitudes {} --transient {} --time {} --parquet {}",
+            "sim-host map{} --start both {} {} --parquet {}",
             self.config.words(),
-            speeds.from,
-            speeds.to,
-            speeds.count,
-            self.grid.square_to,
-            self.grid.sine_to,
-            amplitudes.count,
-            self.times.transient,
-            self.times.time,
+            self.axes(self.amplitudes + 1),
+            self.times(),
             path.display()
+        )
+    }
+
+    fn step_rpm(&self) -> f64 {
+        self.grid.step.expect("it has a default")
+    }
+
+    /// The options of the axes, amplitudes by their number or their steps.
+    fn axes(&self, amplitudes: u32) -> String {
+        let grid = &self.grid;
+        let step = |option, step: Option<f64>| step.map(|step| format!(" --{option} {step}"));
+        let steps = [
+            step("square-step", grid.square_step),
+            step("sine-step", grid.sine_step),
+        ];
+        let amplitudes = match steps {
+            [None, None] => format!(" --amplitudes {amplitudes}"),
+            steps => steps.into_iter().flatten().collect(),
+        };
+        format!(
+            "--from {} --to {} --step {} --square-to {} --sine-to {}{amplitudes}",
+            grid.from,
+            grid.to,
+            self.step_rpm(),
+            grid.square_to,
+            grid.sine_to
+        )
+    }
+
+    fn times(&self) -> String {
+        format!(
+            "--transient {} --time {}",
+            self.times.transient, self.times.time
         )
     }
 
@@ -257,18 +302,11 @@ impl Arguments {
             _ => format!("the paper's but for {}", differences.join(", ")),
         };
         vec![
+            format!("Made by `sim-host schedule {}", self.axes(self.amplitudes)),
             format!(
-                "Made by `sim-host schedule --from {} --to {} --step {} --square-to {} --sine-to {} --amplitudes {}",
-                self.grid.from,
-                self.grid.to,
-                self.step,
-                self.grid.square_to,
-                self.grid.sine_to,
-                self.amplitudes
-            ),
-            format!(
-                "--margin {} --transient {} --time {} --out FILE`; not to be edited by hand. Parameters: {parameters}.",
-                self.margin, self.times.transient, self.times.time
+                "--margin {} {} --out FILE`; not to be edited by hand. Parameters: {parameters}.",
+                self.margin,
+                self.times()
             ),
         ]
     }

@@ -2,11 +2,13 @@
 
 use super::RunOptions;
 use super::advice;
+use super::output::Named;
 use anyhow::{bail, ensure};
 use clap::Args;
 use shared_model::Scenario;
 use sim_host::simulate::{after_transient, early_end, record};
 use sim_host::trace::Trace;
+use sim_host::words::Short;
 
 /// Least and greatest transient, s.
 const TRANSIENTS_S: std::ops::RangeInclusive<f64> = 0.0..=100_000.0;
@@ -29,13 +31,18 @@ pub struct SettledRun {
 }
 
 impl SettledRun {
+    /// The file that is read, if any.
+    pub fn input(&self) -> Option<Named<'_>> {
+        self.run.config.input()
+    }
+
     /// The scenario, checked together with the transient.
     pub fn scenario(&self) -> anyhow::Result<Scenario<f64>> {
         let scenario = self.run.scenario()?;
         ensure!(
             TRANSIENTS_S.contains(&self.transient),
             "--transient {}: must be from {} to {} s",
-            self.transient,
+            Short(self.transient),
             TRANSIENTS_S.start(),
             TRANSIENTS_S.end()
         );
@@ -47,7 +54,7 @@ impl SettledRun {
         ensure!(
             scenario.steps() <= MOST_STATES,
             "--time {}: must be at most {} s, which is {MOST_STATES} steps",
-            scenario.run.duration_s,
+            Short(scenario.run.duration_s),
             f64::from(MOST_STATES) * scenario.step_s()
         );
         let trace = record(&mut after_transient(scenario, self.transient)?, scenario);

@@ -1,18 +1,22 @@
 //! `sim-host simulate`: one run on the host, as CSV.
 
-use super::output::{Output, check_free};
+use super::output::check;
 use super::{Done, RunOptions, advice};
 use anyhow::bail;
+use sim_host::output;
 use sim_host::simulate::{early_end, simulate};
 use sim_host::trace::Trace;
+use sim_host::words::counted;
 use std::path::PathBuf;
 
 /// Run a scenario on the host and write its motion as CSV.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host simulate --rpm 1750 --time 20 --out chaos.csv
-  sim-host simulate --rpm 1750 --dither square --amplitude-v 0.1 --time 20 --out trace.csv
-  sim-host simulate --config vehicle.toml --f32 --out trace.csv")]
+  sim-host simulate --rpm 1750 --time 20 --out simulate.csv
+  sim-host simulate --rpm 1750 --dither square --amplitude-v 0.1 --time 20 \\
+      --out simulate-square.csv
+  sim-host config > vehicle.toml
+  sim-host simulate --config vehicle.toml --f32 --out simulate-f32.csv")]
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
@@ -29,7 +33,8 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let scenario = arguments.run.scenario()?;
-    check_free(&arguments.out, arguments.force)?;
+    let out = Some(("--out", arguments.out.as_path()));
+    check(arguments.run.config.input(), [out], arguments.force)?;
     let trace = if arguments.f32 {
         simulate(&scenario.map(&|value| value as f32))?
     } else {
@@ -40,8 +45,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     }
     write(&trace, &arguments.out, arguments.force)?;
     say!(
-        "{} states over {} s in {}",
-        trace.states.len(),
+        "{} over {} s in {}",
+        counted(trace.states.len(), "state"),
         trace.time_s(trace.states.len() - 1),
         arguments.out.display()
     );
@@ -50,26 +55,25 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 
 /// Writes a trace as CSV, one row a model step; the duty code is that of the step's last PWM period.
 pub fn write(trace: &Trace, path: &std::path::Path, force: bool) -> anyhow::Result<()> {
-    let mut output = Output::create(path, force)?;
-    let mut csv = csv::Writer::from_writer(output.writer());
-    csv.write_record([
-        "time_s",
-        "sideslip_rad",
-        "yaw_rate_rad_per_s",
-        "steering_angle_rad",
-        "steering_rate_rad_per_s",
-        "friction_mode",
-        "duty_code",
-    ])?;
-    let duties = trace.duties.chunks(trace.samples_per_step);
-    for (k, (state, duties)) in trace.states.iter().zip(duties).enumerate() {
-        let mut row = vec![trace.time_s(k).to_string()];
-        row.extend(state.x.iter().map(f64::to_string));
-        row.push(format!("{:?}", state.friction).to_lowercase());
-        row.push(duties.last().map_or(String::new(), u16::to_string));
-        csv.write_record(row)?;
-    }
-    csv.flush()?;
-    drop(csv);
-    output.finish()
+    output::write(path, force, |to| {
+        let mut csv = csv::Writer::from_writer(to);
+        csv.write_record([
+            "time_s",
+            "sideslip_rad",
+            "yaw_rate_rad_per_s",
+            "steering_angle_rad",
+            "steering_rate_rad_per_s",
+            "friction_mode",
+            "duty_code",
+        ])?;
+        let duties = trace.duties.chunks(trace.samples_per_step);
+        for (k, (state, duties)) in trace.states.iter().zip(duties).enumerate() {
+            let mut row = vec![trace.time_s(k).to_string()];
+            row.extend(state.x.iter().map(f64::to_string));
+            row.push(format!("{:?}", state.friction).to_lowercase());
+            row.push(duties.last().map_or(String::new(), u16::to_string));
+            csv.write_record(row)?;
+        }
+        Ok(csv.flush()?)
+    })
 }

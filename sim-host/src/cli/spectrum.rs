@@ -10,6 +10,7 @@ use shared_model::dither::{Application, Waveform};
 use sim_host::chaos::power_spectrum::{MIN_SEGMENT, PowerSpectrum, welch};
 use sim_host::component::Component;
 use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use sim_host::words::{Short, counted};
 use std::f64::consts::TAU;
 
 /// Segments of half overlap that a run has by default.
@@ -22,9 +23,11 @@ const INTERVALS: f64 = 700.0;
 /// The dither, if there is one, is applied as the true signal, so that its line shows.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host spectrum --rpm 1750 --time 200 --figure chaos.svg
-  sim-host spectrum --rpm 1750 --dither square --amplitude-v 0.1 --time 60 --figure dither.svg
-  sim-host spectrum --component steering_angle --segment 20 --time 400 --out spectrum.csv
+  sim-host spectrum --rpm 1750 --time 200 --figure spectrum.svg
+  sim-host spectrum --rpm 1750 --dither square --amplitude-v 0.1 --time 60 \\
+      --figure spectrum-dither.svg
+  sim-host spectrum --component steering_angle --segment 20 --time 400 \\
+      --out spectrum.csv
 
 Components: sideslip (beta), yaw_rate (gamma), steering_angle (delta_f), steering_rate (delta_f_dot).")]
 pub struct Arguments {
@@ -77,7 +80,8 @@ impl Arguments {
         let least_s = MIN_SEGMENT as f64 / rate_hz;
         ensure!(
             length_s >= least_s && length_s <= duration_s,
-            "--segment {length_s}: must be from {least_s} s ({MIN_SEGMENT} samples) to the run's length, --time {duration_s} s"
+            "--segment {}: must be from {least_s} s ({MIN_SEGMENT} samples) to the run's length, --time {duration_s} s",
+            Short(length_s)
         );
         Ok(((length_s * rate_hz).round() as usize).min(scenario.steps() as usize))
     }
@@ -91,7 +95,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         scenario.validate()?;
     }
     let segment = arguments.segment(&scenario)?;
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.run.input())?;
     let trace = arguments.run.trace(&scenario)?;
     let component = arguments.component;
     let (low, high) = trace.range(component.index, 0);
@@ -107,8 +111,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         .destinations
         .write(&results.bins, &results, || chart(&scenario, &results).svg())?;
     say!(
-        "{} segments, bins of {:.4} Hz; power {:.6e} ({})\u{b2}, greatest at {:.4} Hz",
-        results.segments,
+        "{}, bins of {:.4} Hz; power {:.6e} ({})\u{b2}, greatest at {:.4} Hz",
+        counted(results.segments, "segment"),
         results.bin_hz,
         results.power,
         component.unit,
@@ -186,8 +190,9 @@ fn chart(scenario: &Scenario<f64>, results: &Results) -> Chart {
     let unit = results.component.unit;
     let panel = Panel {
         caption: format!(
-            "{} segments, Hann window, half overlap; bins of {:.3} Hz, the greatest in each drawn interval",
-            results.segments, results.bin_hz
+            "{}, Hann window, half overlap; bins of {:.3} Hz, the greatest in each drawn interval",
+            counted(results.segments, "segment"),
+            results.bin_hz
         ),
         x: AxisSpec::logarithmic("frequency (Hz)").from_to(ends.0, ends.1),
         y: AxisSpec::logarithmic(format!("density (({unit})\u{b2}/Hz)")),

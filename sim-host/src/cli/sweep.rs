@@ -12,6 +12,7 @@ use sim_host::engine::taylor::Watched;
 use sim_host::interrupt;
 use sim_host::paper::REGION_EDGES_RPM;
 use sim_host::report::chart::{Look, Region, Series};
+use sim_host::words::counted;
 use std::time::Instant;
 
 /// More runs than this have their cost said first.
@@ -30,16 +31,16 @@ pub enum Over {
     Amplitude,
 }
 
-/// The parameter that is swept, and its values.
+/// The parameter that is swept, and its values. Results ascend whichever end comes first.
 #[derive(Args)]
 pub struct RangeOptions {
     /// Parameter to sweep
     #[arg(long, value_enum, default_value_t = Over::Speed)]
     over: Over,
-    /// Least value, rpm or V [default: 1550 rpm; 0 V]
+    /// One end of its values, from which the steps count, rpm or V [default: 1550 rpm; 0 V]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     from: Option<f64>,
-    /// Greatest value, rpm or V [default: 1900 rpm; 0.14 V of square wave, 1.4 V of sine]
+    /// Other end, which may be the lower one, rpm or V [default: 1900 rpm; 0.14 V of square wave, 1.4 V of sine]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     to: Option<f64>,
     /// Step, rpm or V [default: 5 rpm; 0.002 V of square wave, 0.02 V of sine]
@@ -69,6 +70,46 @@ impl RangeOptions {
             self.to.unwrap_or(to),
             self.step.unwrap_or(step),
         )
+    }
+}
+
+/// A range of wheel speeds instead of one. Results ascend whichever end comes first.
+#[derive(Args)]
+pub struct SpeedRange {
+    /// One end of a range of wheel speeds, from which the steps count, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        allow_negative_numbers = true,
+        requires = "to",
+        conflicts_with = "rpm"
+    )]
+    from: Option<f64>,
+    /// Other end, which may be the lower one, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        allow_negative_numbers = true,
+        requires = "from"
+    )]
+    to: Option<f64>,
+    /// Step of the wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 10.0,
+        allow_negative_numbers = true,
+        requires = "from"
+    )]
+    step: f64,
+}
+
+impl SpeedRange {
+    /// The speeds; without a range that of the scenario alone.
+    pub fn values(&self, scenario: &Scenario<f64>) -> Result<Values, SweepError> {
+        let rpm = scenario.run.wheel_speed_rpm;
+        let (from, to) = (self.from.unwrap_or(rpm), self.to.unwrap_or(rpm));
+        Values::new(Parameter::Speed.name(), from, to, self.step)
     }
 }
 
@@ -148,7 +189,10 @@ pub fn with_progress<R>(runs: usize, work: impl FnOnce(Watch) -> R) -> R {
 /// After Ctrl-C: says what was kept, as the reason why the job was not done in full.
 pub fn check_interrupted(done: usize, of: usize) -> anyhow::Result<()> {
     if interrupt::requested() {
-        bail!("interrupted: {done} of {of} runs were made; the files asked for hold these");
+        bail!(
+            "interrupted after {done} of {}; the files asked for hold these",
+            counted(of, "run")
+        );
     }
     Ok(())
 }

@@ -6,6 +6,7 @@ use anyhow::ensure;
 use serde::Serialize;
 use sim_host::characteristics::{TireRow, tires, tires_chart};
 use sim_host::config::validate;
+use sim_host::words::Short;
 
 /// Cornering force against slip angle (Figure 2): both roads of Table 1, front and rear, Magic Formula and cubic tyre; and the
 /// configured road if it is another.
@@ -13,6 +14,7 @@ use sim_host::config::validate;
 #[command(after_help = "Examples:
   sim-host tires --figure fig2.svg
   sim-host tires --slip-max 0.5 --out tires.csv --json tires.json
+  sim-host config > vehicle.toml
   sim-host tires --config vehicle.toml --figure tires.svg")]
 pub struct Arguments {
     #[command(flatten)]
@@ -39,7 +41,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
     let slip_max_rad = greatest_angle("--slip-max", arguments.slip_max)?;
-    arguments.destinations.check_free()?;
+    arguments.destinations.check(arguments.config.input())?;
     let rows = tires(&scenario, slip_max_rad);
     let results = Results {
         slip_max_rad,
@@ -70,7 +72,8 @@ pub fn greatest_angle(option: &str, angle_rad: f64) -> anyhow::Result<f64> {
     let (least, most) = (1e-4, std::f64::consts::FRAC_PI_2);
     ensure!(
         angle_rad >= least && angle_rad <= most,
-        "{option} {angle_rad}: must be from {least} to {most:.4} rad"
+        "{option} {}: must be from {least} to {most:.4} rad",
+        Short(angle_rad)
     );
     Ok(angle_rad)
 }

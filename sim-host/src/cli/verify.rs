@@ -1,13 +1,15 @@
 //! `sim-host verify`: the main job.
 
-use super::output::check_free;
+use super::output::check;
 use super::{ConfigOptions, Done, time_out};
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use indicatif::{ProgressBar, ProgressStyle};
 use sim_host::config::validate;
+use sim_host::output::make_folder;
 use sim_host::pil::elf::Image;
 use sim_host::report::{self, ReportInput, terminal};
 use sim_host::verify::{Options, Progress, Verification, verify};
+use sim_host::words::Short;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -21,8 +23,9 @@ use std::time::{Duration, Instant};
 /// figures.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host verify                                   the paper's vehicle; report in target/report
-  sim-host verify --force --duration-s 120          longer runs, over the last report
+  sim-host verify           # the paper's vehicle; report in target/report
+  sim-host verify --force --duration-s 120  # longer, over the last report
+  sim-host config > vehicle.toml
   sim-host verify --config vehicle.toml --out report/vehicle")]
 pub struct Arguments {
     #[command(flatten)]
@@ -65,7 +68,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let duration_s = arguments.duration_s;
     ensure!(
         DURATIONS_S.contains(&duration_s),
-        "--duration-s {duration_s}: must be from {} to {} s",
+        "--duration-s {}: must be from {} to {} s",
+        Short(duration_s),
         DURATIONS_S.start(),
         DURATIONS_S.end()
     );
@@ -78,9 +82,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         base,
         duration_s,
     };
-    check_free(&arguments.out.join("index.html"), arguments.force)?;
-    std::fs::create_dir_all(&arguments.out)
-        .with_context(|| format!("cannot make the folder {}", arguments.out.display()))?;
+    arguments.check_outputs()?;
+    make_folder(&arguments.out)?;
 
     let start = Instant::now();
     let verification = with_progress(&options)?;
@@ -92,6 +95,34 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     } else {
         Done::Failed
     })
+}
+
+impl Arguments {
+    /// A report is there if one of its files is.
+    fn check_outputs(&self) -> anyhow::Result<()> {
+        let inputs = [
+            ("--firmware", self.firmware.as_path()),
+            ("--stack-sizes", &self.stack_sizes),
+        ];
+        let mut outputs = check(
+            inputs.into_iter().chain(self.config.input()),
+            [],
+            self.force,
+        )?;
+        outputs.folder("--out", &self.out)?;
+        if self.out.is_dir() {
+            for name in report::FILES {
+                outputs.file("--out", &self.out.join(name))?;
+            }
+            let figures = self.out.join(report::FIGURES);
+            ensure!(
+                self.force || !figures.exists(),
+                "{} exists; give --force to overwrite the figures in it",
+                figures.display()
+            );
+        }
+        Ok(())
+    }
 }
 
 fn with_progress(options: &Options) -> anyhow::Result<Verification> {

@@ -1,5 +1,6 @@
 //! A quantity that is given over time.
 
+use crate::words::Short;
 use serde::Deserialize;
 
 /// Straight lines between knots `[time (s), value]`; constant before the first and behind the last. Two knots of one time are
@@ -17,7 +18,7 @@ pub enum InvalidProfile {
     #[error("no knots: must have at least one, [time (s), value]")]
     Empty,
     /// A time is not finite, or before the knot ahead of it.
-    #[error("knot {number} at {time_s} s: must be a finite time, not before {min_s} s")]
+    #[error("knot {number} at {} s: must be a finite time, not before {} s", Short(*.time_s), Short(*.min_s))]
     Time {
         /// Which knot, from 1.
         number: usize,
@@ -27,7 +28,7 @@ pub enum InvalidProfile {
         min_s: f64,
     },
     /// A value is not finite or not in the quantity's range.
-    #[error("knot {number} = {value}: must be a finite number from {min} to {max}")]
+    #[error("knot {number} = {}: must be a finite number from {} to {}", Short(*.value), Short(*.min), Short(*.max))]
     Value {
         /// Which knot, from 1.
         number: usize,

@@ -2,6 +2,7 @@
 
 use crate::chaos::observe::is_fit;
 use crate::chaos::sweep::{SweepError, Timing, Values, mirrored};
+use crate::words::counted;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use shared_model::dither::Waveform;
@@ -24,30 +25,32 @@ pub struct Grid {
     pub from: f64,
     /// The greatest, rpm or V.
     pub to: f64,
-    /// How many: at least 2.
+    /// How many: at least 1.
     pub count: usize,
 }
 
-impl Grid {
-    /// Distance of neighbours, rpm or V.
-    pub fn step(&self) -> f64 {
-        (self.to - self.from) / (self.count - 1) as f64
-    }
-
-    /// Value number `k`, from 0 on; rpm or V. Bit for bit that of a sweep in these steps.
-    pub fn at(&self, k: usize) -> f64 {
-        self.from + k as f64 * self.step()
-    }
-
-    fn validate(&self, what: &'static str) -> Result<(), PlanError> {
-        if self.count < 2 {
-            return Err(PlanError::TooFew {
-                what,
-                count: self.count,
-            });
+impl From<Values> for Grid {
+    fn from(values: Values) -> Self {
+        Self {
+            from: values.first(),
+            to: values.last(),
+            count: values.count(),
         }
-        Values::new(what, self.from, self.to, self.step().abs())?;
-        Ok(())
+    }
+}
+
+impl Grid {
+    /// Distance of neighbours, rpm or V; 0 without any.
+    pub fn step(&self) -> f64 {
+        (self.to - self.from) / (self.count - 1).max(1) as f64
+    }
+
+    /// Its values, bit for bit those of a sweep in the same decimal steps.
+    fn values(&self, what: &'static str) -> Result<Values, PlanError> {
+        if self.from > self.to {
+            return Err(PlanError::Descending { what });
+        }
+        Ok(Values::between(what, self.from, self.to, self.count)?)
     }
 }
 
@@ -98,16 +101,14 @@ pub enum PlanError {
     /// A range is none.
     #[error(transparent)]
     Range(#[from] SweepError),
-    /// An axis of one value or none.
-    #[error("{what}: {count} cells; there must be at least 2")]
-    TooFew {
+    /// An axis from its greatest value to its least.
+    #[error("{what}: the ends of a map's axis must ascend")]
+    Descending {
         /// What the axis shows.
         what: &'static str,
-        /// Its cells.
-        count: usize,
     },
     /// A map without cells, or with too many to hold.
-    #[error("the map has {cells} cells; it must have 1 to {MOST_CELLS}")]
+    #[error("the map has {}; it must have 1 to {MOST_CELLS}", counted(*.cells, "cell"))]
     Size {
         /// Its cells.
         cells: usize,
@@ -172,10 +173,7 @@ impl Plan {
             return Err(PlanError::Sheets { sheets });
         }
         self.timing()?;
-        self.speeds_rpm.validate("wheel speed (rpm)")?;
-        for sheet in &self.sheets {
-            sheet.amplitudes_v.validate("dither amplitude (V)")?;
-        }
+        let axes = self.axes()?;
         let cells = self.cells();
         if cells == 0 || cells > MOST_CELLS {
             return Err(PlanError::Size { cells });
@@ -188,7 +186,7 @@ impl Plan {
         {
             return Err(PlanError::Uneven);
         }
-        for corner in self.corners() {
+        for corner in self.corners(&axes) {
             if !is_fit(&corner)? {
                 return Err(PlanError::Friction);
             }
@@ -246,25 +244,40 @@ impl Plan {
     pub fn places(&self, tile: usize) -> Vec<Place> {
         let first = tile * CELLS_A_TILE;
         let last = self.cells().min(first + CELLS_A_TILE);
-        (first..last).map(|cell| self.place(cell)).collect()
+        // A plan that is not valid has none.
+        let axes = self.axes().ok();
+        let places = axes.map(|axes| (first..last).map(|cell| self.place(&axes, cell)).collect());
+        places.unwrap_or_default()
     }
 
-    fn place(&self, cell: usize) -> Place {
+    fn axes(&self) -> Result<Axes, PlanError> {
+        let amplitudes = |sheet: &Sheet| sheet.amplitudes_v.values("dither amplitude (V)");
+        Ok(Axes {
+            speeds_rpm: self.speeds_rpm.values("wheel speed (rpm)")?,
+            amplitudes_v: self
+                .sheets
+                .iter()
+                .map(amplitudes)
+                .collect::<Result<_, _>>()?,
+        })
+    }
+
+    fn place(&self, axes: &Axes, cell: usize) -> Place {
         let amplitudes = self.sheets[0].amplitudes_v.count;
         let (column, amplitude) = (cell / amplitudes, cell % amplitudes);
         let (sheet, speed) = (
             column / self.speeds_rpm.count,
             column % self.speeds_rpm.count,
         );
-        self.place_at(&self.sheets[sheet], speed, amplitude)
+        self.place_at(axes, sheet, speed, amplitude)
     }
 
-    fn place_at(&self, sheet: &Sheet, speed: usize, amplitude: usize) -> Place {
+    fn place_at(&self, axes: &Axes, sheet: usize, speed: usize, amplitude: usize) -> Place {
         Place {
-            waveform: sheet.waveform,
-            start: sheet.start,
-            wheel_speed_rpm: self.speeds_rpm.at(speed),
-            dither_amplitude_v: sheet.amplitudes_v.at(amplitude),
+            waveform: self.sheets[sheet].waveform,
+            start: self.sheets[sheet].start,
+            wheel_speed_rpm: axes.speeds_rpm.at(speed),
+            dither_amplitude_v: axes.amplitudes_v[sheet].at(amplitude),
         }
     }
 
@@ -281,17 +294,24 @@ impl Plan {
     }
 
     /// The motions of each sheet at the ends of its axes: all parameters have one range, so the cells between are valid too.
-    fn corners(&self) -> Vec<Scenario<f64>> {
-        let ends = |grid: &Grid| [0, grid.count - 1];
-        let of_sheet = |sheet: &Sheet| {
-            ends(&self.speeds_rpm).map(|speed| {
-                ends(&sheet.amplitudes_v)
-                    .map(|amplitude| self.motion(&self.place_at(sheet, speed, amplitude)))
+    fn corners(&self, axes: &Axes) -> Vec<Scenario<f64>> {
+        let ends = |values: &Values| [0, values.count() - 1];
+        let of_sheet = |sheet: usize| {
+            ends(&axes.speeds_rpm).map(|speed| {
+                ends(&axes.amplitudes_v[sheet])
+                    .map(|amplitude| self.motion(&self.place_at(axes, sheet, speed, amplitude)))
             })
         };
-        let sheets = self.sheets.iter().flat_map(of_sheet);
+        let sheets = (0..self.sheets.len()).flat_map(of_sheet);
         sheets.flatten().collect()
     }
+}
+
+/// The values of a plan's axes.
+struct Axes {
+    speeds_rpm: Values,
+    /// Those of each sheet.
+    amplitudes_v: Vec<Values>,
 }
 
 /// Collects the keys at which two values differ, with both.
@@ -369,6 +389,59 @@ mod tests {
             )
         };
         assert!(places.is_sorted_by(|a, b| key(a) < key(b)));
+    }
+
+    /// As `schedule --map` needs it; one speed and one amplitude are a map too.
+    #[test]
+    fn a_grid_has_the_values_of_the_sweep_that_it_comes_from() {
+        for (from, to, step) in [
+            (1000.0, 2000.0, 25.0),
+            (0.0, 0.15, 0.005),
+            (0.0, 1.35, 0.045),
+            (1600.3, 1700.1, 0.1),
+            (0.14, 0.14, 1.0),
+            (0.3, 0.0, 0.1),
+        ] {
+            let sweep = Values::new("test", from, to, step).unwrap();
+            let grid = Grid::from(sweep).values("test").unwrap();
+            assert!(grid.iter().eq(sweep.iter()), "{from} {to} {step}");
+        }
+    }
+
+    #[test]
+    fn counts_that_make_no_map_are_refused() {
+        let with = |change: fn(&mut Plan)| {
+            let mut plan = plan();
+            change(&mut plan);
+            plan.validate().unwrap_err().to_string()
+        };
+        for (found, part) in [
+            (with(|plan| plan.sheets.clear()), "0 cells"),
+            (
+                with(|plan| plan.speeds_rpm.count = 0),
+                "0 values from 1000 to 2000",
+            ),
+            (
+                with(|plan| plan.speeds_rpm.count = 1),
+                "1 value from 1000 to 2000",
+            ),
+            (
+                with(|plan| plan.speeds_rpm.count = usize::MAX),
+                "the same number",
+            ),
+            (
+                with(|plan| plan.speeds_rpm.count = 1_000_000_000_000),
+                "cells",
+            ),
+            (with(|plan| plan.speeds_rpm.from = 3000.0), "must ascend"),
+            (
+                with(|plan| plan.sheets[1].amplitudes_v.count = 20),
+                "as many amplitudes",
+            ),
+            (with(|plan| plan.speeds_rpm.to = f64::NAN), "finite"),
+        ] {
+            assert!(found.contains(part), "{found} lacks {part:?}");
+        }
     }
 
     #[test]

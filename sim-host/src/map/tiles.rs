@@ -9,7 +9,7 @@ use super::cell::{Cell, cells};
 use super::plan::{CELLS_A_TILE, Place, Plan};
 use crate::bounded;
 use crate::chaos::sweep::Watch;
-use crate::report::file::replace;
+use crate::output::{make_folder, write_text};
 use anyhow::{Context, bail, ensure};
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -72,7 +72,7 @@ impl<'a> Folder<'a> {
     /// # Errors
     /// If it cannot be made, or holds a tile of another plan.
     pub fn make(path: &Path, plan: &'a Plan) -> anyhow::Result<Self> {
-        fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))?;
+        make_folder(path)?;
         Self::open(path, plan)
     }
 
@@ -119,7 +119,7 @@ impl<'a> Folder<'a> {
     }
 
     fn write(&self, tile: usize, cells: &[Cell]) -> anyhow::Result<()> {
-        replace(&self.file(tile), &text(tile, self.plan, cells)?)
+        write_text(&self.file(tile), &text(tile, self.plan, cells)?, true)
     }
 
     fn read(&self, tile: usize) -> anyhow::Result<Vec<Cell>> {

@@ -2,6 +2,7 @@
 
 use crate::bounded;
 use crate::trace::Trace;
+use crate::words::counted;
 use shared_model::Real;
 use shared_model::telemetry::{
     FrameError, HEADER_LEN, Header, Record, TRAILER_LEN, Trailer, is_trailer, record_len,
@@ -65,7 +66,7 @@ pub enum TelemetryError {
         found: u32,
     },
     /// The trailer's count is not that of the records.
-    #[error("telemetry is incomplete: {found} records, but the firmware wrote {written}")]
+    #[error("telemetry is incomplete: {}, but the firmware wrote {written}", counted(*.found, "record"))]
     Count {
         /// Records in the stream.
         found: usize,
@@ -73,7 +74,7 @@ pub enum TelemetryError {
         written: u32,
     },
     /// There is something behind the trailer.
-    #[error("telemetry has {bytes} bytes behind its trailer")]
+    #[error("telemetry has {} after its trailer", counted(*.bytes, "byte"))]
     Excess {
         /// How many.
         bytes: usize,

@@ -2,7 +2,6 @@
 
 pub mod chart;
 mod figure;
-pub(crate) mod file;
 pub(crate) mod html;
 mod junit;
 #[cfg(test)]
@@ -17,10 +16,10 @@ pub use figure::schedule_map::draw as schedule_map;
 
 use crate::closed_loop::run::Run;
 use crate::instructions::Instructions;
+use crate::output::{make_folder, write_text};
 use crate::trace::Trace;
 use crate::verdict::Verdict;
-use anyhow::{Context, ensure};
-use std::fs;
+use anyhow::ensure;
 use std::path::Path;
 
 /// What the report shows of one run on the ECU.
@@ -72,6 +71,12 @@ pub struct DriveReport {
     pub instructions: Instructions,
 }
 
+/// The files of a report but for its figures.
+pub const FILES: [&str; 3] = ["verdict.json", "junit.xml", "index.html"];
+
+/// The folder of its figures.
+pub const FIGURES: &str = "figures";
+
 /// Everything that a report shows.
 #[derive(Debug, Clone, Copy)]
 pub struct ReportInput<'a> {
@@ -104,28 +109,26 @@ pub fn write(directory: &Path, input: &ReportInput) -> anyhow::Result<()> {
         );
     }
     let figures = figure::all(input)?;
-    let figure_directory = directory.join("figures");
-    fs::create_dir_all(&figure_directory)
-        .with_context(|| format!("cannot make {}", figure_directory.display()))?;
+    let figure_directory = directory.join(FIGURES);
+    make_folder(&figure_directory)?;
+    let replace = |path: &Path, text: &str| write_text(path, text, true);
     for figure in &figures {
-        file::replace(
-            &figure_directory.join(format!("{}.svg", figure.name)),
-            &figure.svg,
-        )?;
+        let name = format!("{}.svg", figure.name);
+        replace(&figure_directory.join(name), &figure.svg)?;
     }
     let verdict = serde_json::to_string_pretty(input.verdict)? + "\n";
-    file::replace(&directory.join("verdict.json"), &verdict)?;
     let junit = junit::document(input.title, input.verdict)?;
-    file::replace(&directory.join("junit.xml"), &junit)?;
-    file::replace(
-        &directory.join("index.html"),
-        &html::page(input, &figures).into_string(),
-    )
+    let page = html::page(input, &figures).into_string();
+    for (name, text) in FILES.iter().zip([verdict, junit, page]) {
+        replace(&directory.join(name), &text)?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
     fn writes_every_file_and_the_verdict_with_the_agreed_keys() {

@@ -12,6 +12,7 @@ mod sensitivity;
 mod sweeps;
 
 pub use claims::Judgement;
+pub use page::CLAIMS;
 #[doc(hidden)]
 pub use piece::Product;
 

@@ -3,8 +3,9 @@
 use super::claims::{Judgement, says};
 use super::piece::Product;
 use super::{Options, Quality};
+use crate::output::{make_folder, write_json, write_text};
 use crate::paper::Reproduced;
-use crate::report::{file, html};
+use crate::report::html;
 use anyhow::Context;
 use maud::{Markup, PreEscaped, html};
 use std::fs;
@@ -12,16 +13,18 @@ use std::path::Path;
 
 const TITLE: &str = "Chang's chaotic vehicle and its dither, reproduced";
 
-/// Writes `index.html` and `claims.json`.
+/// File with all judgements, which every reproduction has.
+pub const CLAIMS: &str = "claims.json";
+
+/// Writes `index.html` and the claims.
 pub fn write(
     folder: &Path,
     options: &Options,
     products: &[Product],
     judgements: &[Judgement],
 ) -> anyhow::Result<()> {
-    fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
-    let claims = serde_json::to_string_pretty(judgements)? + "\n";
-    file::replace(&folder.join("claims.json"), &claims)?;
+    make_folder(folder)?;
+    write_json(&folder.join(CLAIMS), &judgements, true)?;
     let mut pieces = Vec::new();
     for product in products {
         pieces.push(piece(folder, product)?);
@@ -35,10 +38,8 @@ pub fn write(
         (table(judgements))
         @for piece in &pieces { (piece) }
     };
-    file::replace(
-        &folder.join("index.html"),
-        &html::document(TITLE, &body).into_string(),
-    )
+    let page = html::document(TITLE, &body).into_string();
+    write_text(&folder.join("index.html"), &page, true)
 }
 
 fn table(judgements: &[Judgement]) -> Markup {

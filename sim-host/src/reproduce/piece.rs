@@ -7,12 +7,10 @@ use super::{
 use crate::bounded;
 use crate::chaos::observe::is_fit;
 use crate::chaos::sweep::Watch;
+use crate::output::{make_folder, write_json, write_text};
 use crate::report::chart::Chart;
-use crate::report::file;
-use anyhow::Context;
 use serde::{Deserialize, Serialize};
 use shared_model::Scenario;
-use std::fs;
 use std::path::Path;
 
 /// A piece that is to be made.
@@ -224,12 +222,11 @@ impl Piece {
         material: Material,
     ) -> anyhow::Result<Product> {
         let figures = folder.join("figures");
-        fs::create_dir_all(&figures)
-            .with_context(|| format!("cannot make {}", figures.display()))?;
+        make_folder(&figures)?;
         for drawing in &material.drawings {
             let at = |ending| figures.join(format!("{}.{ending}", drawing.name));
-            file::replace(&at("svg"), &drawing.chart.svg()?)?;
-            file::replace(&at("csv"), &drawing.csv)?;
+            write_text(&at("svg"), &drawing.chart.svg()?, true)?;
+            write_text(&at("csv"), &drawing.csv, true)?;
         }
         let product = Product {
             fingerprint: self.fingerprint(options),
@@ -242,8 +239,7 @@ impl Piece {
             judgements: material.judgements,
             findings: material.findings,
         };
-        let record = serde_json::to_string_pretty(&product)? + "\n";
-        file::replace(&self.record(folder), &record)?;
+        write_json(&self.record(folder), &product, true)?;
         Ok(product)
     }
 

@@ -109,10 +109,10 @@ fn amplitude(
     scenario.run.wheel_speed_rpm = DITHERED_RPM;
     scenario.dither.waveform = waveform;
     let (points, width) = match quality {
-        Quality::Quick => (28.0, greatest_v / 100.0),
-        Quality::Full => (140.0, 0.5e-3),
+        Quality::Quick => (29, greatest_v / 100.0),
+        Quality::Full => (141, 0.5e-3),
     };
-    let values = Values::new("dither amplitude", 0.0, greatest_v, greatest_v / points)?;
+    let values = Values::between("dither amplitude", 0.0, greatest_v, points)?;
     let sweep = sweep(
         &scenario,
         Parameter::Amplitude,

@@ -3,7 +3,6 @@
 use super::Plan;
 use super::map::Cell;
 use crate::chaos::attractor::Kind;
-use crate::chaos::sweep::Values;
 use crate::map::cell;
 use crate::map::plan::{Grid, Plan as MapPlan, PlanError, Sheet, Start};
 use shared_model::Scenario;
@@ -15,7 +14,7 @@ const SAME_END: f64 = 1e-9;
 /// The plan of the map that schedules of square wave and sine, over the same speeds, begin with.
 ///
 /// # Errors
-/// If there is no such map: it needs at least two speeds, and motions that the engine can follow.
+/// If there is no such map: it needs motions that the engine can follow.
 pub fn fitting(scenario: &Scenario<f64>, square: &Plan, sine: &Plan) -> Result<MapPlan, PlanError> {
     let sheets = [Start::Given, Start::Mirrored]
         .into_iter()
@@ -23,19 +22,11 @@ pub fn fitting(scenario: &Scenario<f64>, square: &Plan, sine: &Plan) -> Result<M
             [(Waveform::Square, square), (Waveform::Sine, sine)].map(|(waveform, plan)| Sheet {
                 waveform,
                 start,
-                amplitudes_v: grid(&plan.amplitudes_v),
+                amplitudes_v: plan.amplitudes_v.into(),
             })
         });
-    let speeds_rpm = grid(&square.speeds_rpm);
+    let speeds_rpm = square.speeds_rpm.into();
     MapPlan::new(*scenario, sheets.collect(), speeds_rpm, square.timing)
-}
-
-fn grid(values: &Values) -> Grid {
-    Grid {
-        from: values.iter().next().unwrap_or_default(),
-        to: values.iter().next_back().unwrap_or_default(),
-        count: values.count(),
-    }
 }
 
 /// In what a map differs from the fitting one, in words; nothing if it fits. Sheets that it has beyond those do no harm.
@@ -132,7 +123,7 @@ fn kind(cell: &cell::Cell) -> Kind {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chaos::sweep::Timing;
+    use crate::chaos::sweep::{Timing, Values};
     use crate::map::cell::Kind as MapKind;
 
     fn plan(greatest_v: f64) -> Plan {

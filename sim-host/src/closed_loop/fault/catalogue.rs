@@ -1,5 +1,6 @@
 //! What can be done to the loop, as data.
 
+use crate::words::counted;
 use shared_model::gate::Limits;
 use shared_model::signal::Measurement;
 use std::fmt;
@@ -341,8 +342,7 @@ impl fmt::Display for Fault {
             Kind::Timing(failure) => write!(f, "{failure}"),
         }?;
         match self.ticks {
-            Some(1) => write!(f, ", 1 tick"),
-            Some(ticks) => write!(f, ", {ticks} ticks"),
+            Some(ticks) => write!(f, ", {}", counted(ticks, "tick")),
             None => Ok(()),
         }
     }
@@ -372,7 +372,7 @@ impl fmt::Display for LinkFailure {
             Self::Repetition => write!(f, "repeated"),
             Self::Loss => write!(f, "lost"),
             Self::Delay { ticks } => write!(f, "late by {ticks}"),
-            Self::Insertion { age_ticks } => write!(f, "one of {age_ticks} ticks ago"),
+            Self::Insertion { age_ticks } => write!(f, "one of {} ago", counted(age_ticks, "tick")),
             Self::Masquerade => write!(f, "of another sender"),
             Self::WrongSequence { ahead } => write!(f, "counter ahead by {ahead}"),
         }
@@ -385,10 +385,14 @@ impl fmt::Display for ServoFailure {
             Self::Stuck => write!(f, "duty stuck"),
             Self::Saturated { high: true } => write!(f, "duty at 100 %"),
             Self::Saturated { high: false } => write!(f, "duty at 0 %"),
-            Self::DitherPhase { periods } => write!(f, "dither late by {periods} periods"),
+            Self::DitherPhase { periods } => {
+                write!(f, "dither late by {}", counted(periods, "period"))
+            }
             Self::DitherInverted => write!(f, "dither inverted"),
-            Self::DitherFrequency { held } => write!(f, "dither held over {held} periods"),
-            Self::Offset { counts } => write!(f, "duty off by {counts} counts"),
+            Self::DitherFrequency { held } => {
+                write!(f, "dither held over {}", counted(held, "period"))
+            }
+            Self::Offset { counts } => write!(f, "duty off by {}", counted(counts, "count")),
         }
     }
 }
@@ -396,11 +400,11 @@ impl fmt::Display for ServoFailure {
 impl fmt::Display for TimingFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
-            Self::MissedPwm(count) => write!(f, "PWM interrupt missed {count} times"),
-            Self::DoublePwm(count) => write!(f, "PWM interrupt doubled {count} times"),
+            Self::MissedPwm(count) => write!(f, "PWM interrupt missed {}", counted(count, "time")),
+            Self::DoublePwm(count) => write!(f, "PWM interrupt doubled {}", counted(count, "time")),
             Self::MissedControl => write!(f, "control interrupt missed"),
             Self::DoubleControl => write!(f, "control interrupt doubled"),
-            Self::Overrun(periods) => write!(f, "control late by {periods} periods"),
+            Self::Overrun(periods) => write!(f, "control late by {}", counted(periods, "period")),
             Self::Clock(ratio) => write!(f, "clock at {ratio} of its rate"),
             Self::Reset => write!(f, "reset"),
         }

@@ -7,7 +7,7 @@ macro_rules! example {
     ($name:literal) => {
         include_str!(concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/../examples/manoeuvres/",
+            "/examples/manoeuvres/",
             $name,
             ".toml"
         ))

@@ -16,6 +16,7 @@ use crate::pil::qemu::{RunError, SocketError};
 use crate::pil::qmp::Qmp;
 use crate::pil::session::Session;
 use crate::pil::settings;
+use crate::words::counted;
 
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
@@ -145,7 +146,7 @@ impl fmt::Display for Action {
         match *self {
             Self::Flip { address, bit } => write!(f, "bit {bit} at {address:#010x}"),
             Self::FlipStack { offset, bit, .. } => write!(f, "bit {bit} at sp + {offset}"),
-            Self::MissPwm(count) => write!(f, "{} {count} times", self.name()),
+            Self::MissPwm(count) => write!(f, "{} {}", self.name(), counted(count, "time")),
             _ => write!(f, "{}", self.name()),
         }
     }

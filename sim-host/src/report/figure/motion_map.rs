@@ -258,7 +258,11 @@ fn name(sheet: &Sheet) -> String {
 /// Axes that end at the outer edges of the cells.
 fn axes(plan: &Plan, sheet: &Sheet) -> (Axis, Axis) {
     let ends = |grid: &crate::map::plan::Grid| {
-        let half = 0.5 * grid.step();
+        // A single row or column has no neighbour to share the room with.
+        let half = match grid.count {
+            1 => (0.005 * grid.from.abs()).max(0.001),
+            _ => 0.5 * grid.step(),
+        };
         (grid.from - half, grid.to + half)
     };
     let (left, right) = ends(&plan.speeds_rpm);

@@ -1,0 +1,143 @@
+//! The examples of all help texts, run one after the other in one empty folder, as a reader would who copies them.
+//!
+//! Those that need the firmware must get as far as its missing file; those that take long must begin their work.
+
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Subcommands whose examples need QEMU or what was made in it.
+const WITH_FIRMWARE: [&str; 5] = ["verify", "pil", "decode", "image", "qemu"];
+/// Where the firmware's images are.
+const IMAGES: &str = "thumbv7em-none-eabihf";
+/// Examples of 15 s of work and more.
+const LONG: [&str; 5] = [
+    "sim-host reproduce --quick # everything in seconds",
+    "sim-host reproduce # full quality, in target/reproduction",
+    "sim-host reproduce --config vehicle.toml --out target/vehicle",
+    "sim-host faults --quick",
+    "sim-host schedule --out schedule_table.rs",
+];
+/// After this long work has begun, and bad arguments have been refused.
+const BEGUN: Duration = Duration::from_millis(800);
+
+fn help(at: &Path, arguments: &[&str], columns: &str) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_sim-host"));
+    command
+        .args(arguments)
+        .current_dir(at)
+        .env("COLUMNS", columns);
+    let output = command.output().expect("it starts");
+    assert!(output.status.success(), "{arguments:?}");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+/// The names in the list of commands.
+fn subcommands(at: &Path) -> Vec<String> {
+    let help = help(at, &["--help"], "200");
+    let list = help
+        .split("Commands:\n")
+        .nth(1)
+        .expect("a list of commands");
+    let lines = list.lines().take_while(|line| !line.is_empty());
+    let names = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let names = names.filter_map(|line| line.split_whitespace().next());
+    names
+        .filter(|name| *name != "help")
+        .map(str::to_owned)
+        .collect()
+}
+
+/// The examples of a subcommand, each on one line.
+fn examples(at: &Path, subcommand: &str, columns: &str) -> Vec<String> {
+    let help = help(at, &[subcommand, "--help"], columns);
+    let after = help
+        .lines()
+        .skip_while(|line| !line.starts_with("Examples"));
+    let block = after.skip(1).take_while(|line| line.starts_with("  "));
+    let block: Vec<&str> = block.map(str::trim).collect();
+    let lines = block.join("\n").replace("\\\n", "");
+    let words = |line: &str| line.split_whitespace().collect::<Vec<_>>().join(" ");
+    lines
+        .lines()
+        .map(words)
+        .filter(|line| !line.starts_with('#'))
+        .collect()
+}
+
+/// The example in a shell, `sim-host` being the program under test.
+fn shell(at: &Path, example: &str) -> Command {
+    let program = PathBuf::from(env!("CARGO_BIN_EXE_sim-host"));
+    let mut path = OsString::from(program.parent().expect("a folder"));
+    path.push(":");
+    path.push(std::env::var_os("PATH").unwrap_or_default());
+    let mut command = Command::new("sh");
+    // In the shell's place, so that a long one can be ended.
+    command
+        .args(["-c", &format!("exec {example}")])
+        .env("PATH", path);
+    command.current_dir(at);
+    command
+}
+
+fn outcome(output: &Output) -> (Option<i32>, String) {
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    (output.status.code(), message)
+}
+
+/// Begins its work and is ended.
+fn begin(at: &Path, example: &str) {
+    let mut command = shell(at, example);
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = command.spawn().expect("a shell");
+    let start = Instant::now();
+    while start.elapsed() < BEGUN {
+        let ended = child.try_wait().expect("it can be waited for");
+        assert!(ended.is_none_or(|status| status.success()), "{example}");
+        std::thread::sleep(BEGUN / 20);
+    }
+    child.kill().expect("it can be ended");
+    child.wait().expect("it has ended");
+}
+
+#[test]
+fn all_examples_run_one_after_the_other() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let at = folder.path();
+    let mut all = BTreeSet::new();
+    for subcommand in subcommands(at) {
+        let examples = examples(at, &subcommand, "200");
+        assert!(!examples.is_empty(), "{subcommand} has no example");
+        for example in examples.iter().filter(|line| line.starts_with("sim-host ")) {
+            if LONG.contains(&example.as_str()) {
+                begin(at, example);
+            } else {
+                let (code, message) = outcome(&shell(at, example).output().expect("a shell"));
+                let needs_firmware =
+                    WITH_FIRMWARE.contains(&subcommand.as_str()) || example.contains(IMAGES);
+                if needs_firmware && example != "sim-host config > vehicle.toml" {
+                    assert_eq!(code, Some(2), "{example}: {message}");
+                    assert!(message.contains("No such file"), "{example}: {message}");
+                } else {
+                    assert_eq!(code, Some(0), "{example}: {message}");
+                }
+            }
+            all.insert(example.clone());
+        }
+    }
+    assert!(all.len() > 50, "{all:?}");
+    assert!(LONG.iter().all(|example| all.contains(*example)), "{all:?}");
+}
+
+/// On a terminal of the usual width no line is broken, so none within an option.
+#[test]
+fn no_example_is_broken_on_80_columns() {
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    for subcommand in subcommands(folder.path()) {
+        let [narrow, wide] =
+            ["80", "200"].map(|columns| examples(folder.path(), &subcommand, columns));
+        assert_eq!(narrow, wide, "{subcommand}");
+    }
+}
