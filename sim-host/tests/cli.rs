@@ -132,11 +132,14 @@ fn outputs_are_not_overwritten_unasked() {
     assert!(csv.starts_with("time_s,sideslip_rad,yaw_rate_rad_per_s,"));
     assert_eq!(csv.lines().count(), 1001);
     // A folder that is not there, or is a file.
-    for out in ["missing/t.csv", "t.csv/u.csv"] {
+    for (out, part) in [
+        ("missing/t.csv", "there is no folder missing"),
+        ("t.csv/u.csv", "t.csv is no folder"),
+    ] {
         assert_refused(
             folder.path(),
             ["simulate", "--time", "1", "--out", out],
-            &["cannot write into"],
+            &["cannot write", out, part],
         );
     }
 }
@@ -268,7 +271,10 @@ fn verify_checks_its_options_first() {
     fs::create_dir(folder.path().join("r")).expect("the folder can be made");
     fs::write(folder.path().join("r/index.html"), "precious").expect("the file can be written");
     verify(&["--out", "r"], &["index.html exists", "--force"]);
-    verify(&["--out", "arm.elf/r"], &["cannot make the folder"]);
+    verify(
+        &["--out", "arm.elf/r"],
+        &["cannot write arm.elf/r", "Not a directory"],
+    );
     let kept = fs::read_to_string(folder.path().join("r/index.html")).expect("it is there");
     assert_eq!(kept, "precious");
 }

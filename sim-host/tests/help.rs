@@ -13,7 +13,8 @@ const WITH_FIRMWARE: [&str; 5] = ["verify", "pil", "decode", "image", "qemu"];
 /// Where the firmware's images are.
 const IMAGES: &str = "thumbv7em-none-eabihf";
 /// Examples of 15 s of work and more.
-const LONG: [&str; 4] = [
+const LONG: [&str; 5] = [
+    "sim-host reproduce --quick # everything in seconds",
     "sim-host reproduce # full quality, in target/reproduction",
     "sim-host reproduce --config vehicle.toml --out target/vehicle",
     "sim-host faults --quick",

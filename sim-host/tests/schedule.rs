@@ -19,7 +19,7 @@ fn plan(from_rpm: f64, to_rpm: f64, greatest_v: f64) -> Plan {
     let step_v = greatest_v / 30.0;
     Plan {
         speeds_rpm: Values::new("wheel speed", from_rpm, to_rpm, 25.0).unwrap(),
-        amplitudes_v: Values::new("amplitude", 0.0, greatest_v, step_v).unwrap(),
+        amplitudes_v: Values::parts("amplitude", greatest_v, 30).unwrap(),
         edge_width_v: step_v / 16.0,
         margin: 0.25,
         timing: Timing::new(150.0, 200.0).unwrap(),

@@ -211,16 +211,16 @@ impl Values {
     /// If `to` is not a positive number, or there is no part.
     pub fn parts(what: &'static str, to: f64, parts: usize) -> Result<Self, SweepError> {
         let count = parts.saturating_add(1);
-        Self::between(what, 0.0, to, count)?;
-        if to < 0.0 {
+        if to <= 0.0 {
             return Err(SweepError::Count {
                 what,
                 from: 0.0,
                 to,
                 count,
-                fault: "the second must be greater than 0",
+                fault: "the end must be greater than 0",
             });
         }
+        Self::between(what, 0.0, to, count)?;
         Ok(Self(Kind::Multiples {
             of: to / parts as f64,
             count,
