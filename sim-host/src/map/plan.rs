@@ -416,7 +416,7 @@ mod tests {
             plan.validate().unwrap_err().to_string()
         };
         for (found, part) in [
-            (with(|plan| plan.sheets.clear()), "0 cells"),
+            (with(|plan| plan.sheets.clear()), "0 sheets"),
             (
                 with(|plan| plan.speeds_rpm.count = 0),
                 "0 values from 1000 to 2000",

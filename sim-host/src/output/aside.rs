@@ -105,6 +105,14 @@ mod tests {
     use std::fs;
     use std::io::Write;
 
+    #[test]
+    fn an_error_does_not_name_the_hidden_file() {
+        let at = tempfile::tempdir().unwrap();
+        let begun = Aside::begin(at.path().join("none/file"), None);
+        let error = begun.err().expect("there is no folder").to_string();
+        assert!(!error.contains(".sim-host-"), "{error}");
+    }
+
     /// Both ways of writing aside end in the same file, and leave nothing when they are given up.
     #[test]
     fn with_and_without_a_name() {

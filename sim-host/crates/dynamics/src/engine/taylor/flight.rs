@@ -28,7 +28,7 @@ const MOST_SHRINKS: usize = 300;
 /// A mode shorter than this, s, is one of a row in which a motion slides along a step of its friction law.
 const SHORT_MODE_S: f64 = 1e-6;
 /// Largest last term of a tangent vector's expansion, as a share of its length.
-const TANGENT_TOLERANCE: f64 = 1e-7;
+const TANGENT_TOLERANCE: f64 = 1e-5;
 /// Steps after which the last motions take turns, interruptions are heard, and the number of steps is held against its bound.
 const STEPS_A_TURN: usize = 64;
 /// Steps that a motion may take: at once, and per second of motion. The paper's take some ten per second.
