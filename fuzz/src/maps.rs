@@ -68,7 +68,7 @@ fn read_tile(bytes: &[u8]) {
 }
 
 fn read_parquet(bytes: &[u8]) {
-    if let Ok((plan, cells)) = table::read(bytes::Bytes::copy_from_slice(bytes)) {
+    if let Ok((plan, cells)) = table::read(bytes.to_vec()) {
         assert_eq!(cells.len(), plan.cells());
     }
 }

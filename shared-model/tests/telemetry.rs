@@ -25,8 +25,9 @@ prop_compose! {
 
 prop_compose! {
     fn header()(
-        samples_per_step: u16, step_rate_hz: u32, pwm_period: u16, cost_clock_hz: u32, instruction_rate_hz: u32,
-        initial in state(),
+        samples_per_step in 1..=1000_u16, step_rate_hz in 1..=1_000_000_u32, pwm_period in 2..=u16::MAX,
+        cost_clock_hz in 1..=u32::MAX, instruction_rate_hz: u32,
+        initial in state().prop_filter("a run starts at numbers", |state| state.x.iter().all(|x| x.is_finite())),
     ) -> Header {
         Header { samples_per_step, step_rate_hz, pwm_period, cost_clock_hz, instruction_rate_hz, initial }
     }
@@ -217,6 +218,70 @@ fn other_versions_are_refused() {
     let error = Header::decode(&next).unwrap_err();
     assert_eq!(error, FrameError::Version(VERSION + 1));
     assert_eq!(error.to_string(), "format version 3; this program reads 2");
+}
+
+/// Nor is a header of no run.
+#[test]
+fn headers_of_no_run_are_refused() {
+    let good = Header {
+        samples_per_step: 10,
+        step_rate_hz: 1000,
+        pwm_period: 2500,
+        cost_clock_hz: 25_000_000,
+        instruction_rate_hz: 0,
+        initial: STATE,
+    };
+    let refusal = |header: Header| {
+        Header::decode(&encode_header(&header))
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(Header::decode(&encode_header(&good)).is_ok());
+    for (samples_per_step, bad) in [(0, "= 0"), (1001, "= 1001")] {
+        let refusal = refusal(Header {
+            samples_per_step,
+            ..good
+        });
+        assert_eq!(
+            refusal,
+            format!("samples_per_step {bad}: must be from 1 to 1000")
+        );
+    }
+    assert!(
+        refusal(Header {
+            step_rate_hz: 0,
+            ..good
+        })
+        .contains("step_rate_hz = 0")
+    );
+    assert!(
+        refusal(Header {
+            step_rate_hz: u32::MAX,
+            ..good
+        })
+        .contains("1000000")
+    );
+    assert!(
+        refusal(Header {
+            pwm_period: 1,
+            ..good
+        })
+        .contains("pwm_period = 1")
+    );
+    assert!(
+        refusal(Header {
+            cost_clock_hz: 0,
+            ..good
+        })
+        .contains("cost_clock_hz = 0")
+    );
+    for value in [f32::NAN, f32::INFINITY] {
+        let initial = State {
+            x: [0.0, value, 0.0, 0.0].into(),
+            ..STATE
+        };
+        assert!(refusal(Header { initial, ..good }).contains("not finite"));
+    }
 }
 
 /// A mode that does not exist is no damage that the checksum can see.

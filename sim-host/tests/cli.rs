@@ -365,12 +365,17 @@ fn verify_checks_its_options_first() {
 
 /// A telemetry stream of three records.
 fn telemetry() -> Vec<u8> {
+    telemetry_of([1562, 1563].as_slice())
+}
+
+/// The same, of records with these duty codes.
+fn telemetry_of(duties: &[u16]) -> Vec<u8> {
     let state = State {
         x: [0.1_f32, -0.2, 0.3, -0.4].into(),
         friction: FrictionMode::Negative,
     };
     let header = Header {
-        samples_per_step: 2,
+        samples_per_step: duties.len() as u16,
         step_rate_hz: 1000,
         pwm_period: 2500,
         cost_clock_hz: 25_000_000,
@@ -388,7 +393,7 @@ fn telemetry() -> Vec<u8> {
             control_cost: 300,
             pwm_cost: 60,
         };
-        let length = record.encode([1562, 1563], &mut buffer);
+        let length = record.encode(duties.iter().copied(), &mut buffer);
         stream.extend(&buffer[..length]);
     }
     let trailer = Trailer {
@@ -428,6 +433,14 @@ fn damaged_telemetry_is_refused() {
     }
     assert!(!folder.path().join("t.csv").exists(), "nothing is written");
     assert_refused(folder.path(), ["decode", "none.bin"], &["none.bin"]);
+    // Whole, with check sums that fit, and no duty code a step.
+    let parts = ["samples_per_step = 0", "from 1 to 1000"];
+    fs::write(&path, telemetry_of(&[])).expect("the file can be written");
+    assert_refused(folder.path(), decode, &parts);
+    // No timer of that period holds such a code.
+    fs::write(&path, telemetry_of(&[1250, 2501])).expect("the file can be written");
+    let parts = ["record 1", "duty code 2501", "2500 counts"];
+    assert_refused(folder.path(), decode, &parts);
 
     fs::write(&path, &whole).expect("the file can be written");
     assert_ends(&mut command(folder.path(), decode), 0);

@@ -12,6 +12,7 @@ use sim_host::chaos::sweep::Timing;
 use sim_host::map::cell::{self, Cell, cells};
 use sim_host::map::plan::{Grid, Place, Plan, Sheet, Start};
 use sim_host::map::table::PLAN_KEY;
+use sim_host::map::tiles::resealed;
 use std::fs;
 use std::path::Path;
 
@@ -84,12 +85,89 @@ fn tiles_of_another_plan_or_damaged_ones_are_refused() {
     let text = fs::read_to_string(&tile).unwrap();
     let (cut, _) = text.trim_end().rsplit_once('\n').unwrap();
     fs::write(&tile, cut).unwrap();
+    let parts = ["tile-000000.csv", "check sum", "delete it"];
+    assert_refused(at, "map merge w --out o.csv", &parts);
+    fs::write(&tile, resealed(cut)).unwrap();
     let parts = ["tile-000000.csv", "not complete", "delete it"];
     assert_refused(at, "map merge w --out o.csv", &parts);
     fs::write(&tile, "no tile").unwrap();
     assert_refused(at, "map merge w --out o.csv", &["cannot use", "delete it"]);
     fs::create_dir(at.join("empty")).unwrap();
     assert_refused(at, "map merge empty --out o.csv", &["empty has no tiles"]);
+}
+
+/// Whatever digit of a tile is edited, and whatever its plan says with a check sum that fits: no number goes into a result, and
+/// none is counted by.
+#[test]
+fn edited_tiles_are_refused() {
+    let folder = folder();
+    let at = folder.path();
+    let small = "map --dither square --speeds 3 --amplitudes 3 --transient 1 --time 3 --work w";
+    assert_well(at, "2", &format!("{small} --out own.csv"));
+    let tile = at.join("w/tile-000000.csv");
+    let whole = fs::read_to_string(&tile).unwrap();
+    let merge = "map merge w --out o.csv";
+    let digits = whole.char_indices().filter(|(_, c)| c.is_ascii_digit());
+    for (digit, _) in digits.step_by(97) {
+        let mut edited = whole.clone().into_bytes();
+        edited[digit] = b'0' + (edited[digit] - b'0' + 1) % 10;
+        fs::write(&tile, edited).unwrap();
+        assert_refused(at, merge, &["tile-000000.csv", "check sum", "delete it"]);
+    }
+    let count = r#""count":3"#;
+    let sheets = whole.find(r#""sheets":["#).unwrap()..=whole.find("],").unwrap();
+    let without_sheets = whole.replace(&whole[sheets], r#""sheets":[]"#);
+    let number = |key: &str, value: &str| {
+        let from = whole.find(key).unwrap() + key.len();
+        let length = whole[from..].find([',', '}']).unwrap();
+        format!("{}{value}{}", &whole[..from], &whole[from + length..])
+    };
+    for (edited, part) in [
+        (without_sheets, "0 sheets"),
+        (whole.replacen(count, r#""count":0"#, 2), "0 cells"),
+        (
+            whole.replacen(count, r#""count":1000000000000"#, 2),
+            "ten million",
+        ),
+        (
+            whole.replacen(count, r#""count":9223372036854775808"#, 2),
+            "ten million",
+        ),
+        (whole.replacen(count, r#""count":4"#, 1), "not complete"),
+        (number(r#""observed_s":"#, "-2.0"), "transient"),
+        (number(r#""observed_s":"#, "0.0"), "transient"),
+        (number(r#""observed_s":"#, "1e300"), "1000000 s"),
+        (number(r#""observed_s":"#, "1e999"), "cannot use"),
+        (number(r#""observed_s":"#, "null"), "cannot use"),
+        (number(r#""transient_s":"#, "-1.0"), "transient"),
+        (number(r#""transient_s":"#, "NaN"), "cannot use"),
+        (number(r#""mass_kg":"#, "-1500.0"), "mass_kg = -1500"),
+        (number(r#"{"tile":"#, "1"), "tile 1 of 1"),
+        (
+            number(r#"{"tile":"#, "18446744073709551615"),
+            "tile 18446744073709551615 of 1",
+        ),
+        (number("equilibrium,", "-1"), "cannot use"),
+    ] {
+        assert_ne!(edited, whole, "{part}");
+        fs::write(&tile, resealed(&edited)).unwrap();
+        assert_refused(at, merge, &["tile-000000.csv", part, "delete it"]);
+        // The same where work continues.
+        assert_refused(
+            at,
+            &format!("{small} --out o.csv"),
+            &["tile-000000.csv", "delete it"],
+        );
+    }
+    fs::write(&tile, resealed(&whole)).unwrap();
+    assert_well(at, "2", &format!("{merge} --force"));
+    let read = |name: &str| fs::read(at.join(name)).unwrap();
+    assert!(read("o.csv") == read("own.csv"));
+    // A file of 10 GB is not read.
+    let long = fs::File::options().write(true).open(&tile).unwrap();
+    long.set_len(10 << 30).unwrap();
+    fs::remove_file(at.join("o.csv")).unwrap();
+    assert_refused(at, merge, &["tile-000000.csv", "longer than"]);
 }
 
 #[test]

@@ -18,7 +18,6 @@ use sim_host::schedule::choose::Choice;
 use sim_host::schedule::map::Cell;
 use sim_host::schedule::{Analysis, Plan, from_map, runs, schedule, table};
 use sim_host::words::{Short, counted};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// The dither amplitude W that each wheel speed N needs, for square wave and sine: the table that the ECU carries.
@@ -217,7 +216,7 @@ impl Arguments {
     }
 
     fn read_map(&self, path: &Path, fitting: &MapPlan) -> anyhow::Result<(MapPlan, Vec<MapCell>)> {
-        let (map, cells) = sim_host::map::table::read(File::open(path)?)?;
+        let (map, cells) = sim_host::map::table::open(path)?;
         let misfits = from_map::misfits(&map, fitting);
         ensure!(misfits.is_empty(), "{}", misfits.join("; "));
         Ok((map, cells))

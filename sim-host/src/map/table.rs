@@ -2,26 +2,33 @@
 
 use super::cell::Cell;
 use super::plan::Plan;
+use crate::bounded;
 use anyhow::{Context, bail, ensure};
+use bytes::Bytes;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
+use parquet::column::page::Page;
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
 use parquet::file::metadata::{FileMetaData, KeyValue};
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
+use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::record::{Field, Row};
 use parquet::schema::types::Type;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::io::Write;
-use std::panic::UnwindSafe;
+use std::path::Path;
 use std::sync::Arc;
 
 /// Key of the file's metadata under which the plan is, as JSON.
 pub const PLAN_KEY: &str = "plan";
 
 /// Most rows that a byte of a file can hold: neighbours differ in at least one number, which takes a bit.
-const MOST_ROWS_A_BYTE: u64 = 8;
+const MOST_ROWS_A_BYTE: usize = 8;
+/// First bytes of a Parquet file.
+const MAGIC: &[u8] = b"PAR1";
+/// Longest file, bytes: the most cells that a map can have, each number as it is.
+const MOST_BYTES: u64 = 2 << 30;
 
 /// Key of the CRC-32 of plan and cells as JSON: the format's own pages carry none.
 const CHECKSUM_KEY: &str = "crc32";
@@ -52,11 +59,7 @@ enum Values {
 /// If the writer fails.
 pub fn write(plan: &Plan, cells: &[Cell], to: impl Write + Send) -> anyhow::Result<()> {
     let columns = columns(cells)?;
-    let fields = columns.iter().map(Column::field);
-    let fields = fields.collect::<Result<Vec<_>, _>>()?;
-    let schema = Type::group_type_builder("map")
-        .with_fields(fields)
-        .build()?;
+    let schema = schema(&columns)?;
     let checksum = KeyValue::new(CHECKSUM_KEY.into(), checksum(plan, cells)?);
     let plan = KeyValue::new(PLAN_KEY.into(), serde_json::to_string(plan)?);
     let properties = WriterProperties::builder()
@@ -73,29 +76,43 @@ pub fn write(plan: &Plan, cells: &[Cell], to: impl Write + Send) -> anyhow::Resu
     Ok(())
 }
 
-/// Reads plan and cells of a table, the cells in the plan's order.
+/// Reads plan and cells of a file, the cells in the plan's order.
 ///
 /// # Errors
 /// If it is no table that this version of the program has written, or a damaged one.
-pub fn read(from: impl ChunkReader + UnwindSafe + 'static) -> anyhow::Result<(Plan, Vec<Cell>)> {
+pub fn open(path: &Path) -> anyhow::Result<(Plan, Vec<Cell>)> {
+    let is_start = |start: &[u8]| start.starts_with(MAGIC);
+    read(bounded::read(path, MOST_BYTES, is_start)?)
+}
+
+/// Reads plan and cells of a table, the cells in the plan's order.
+///
+/// # Errors
+/// As [`open`].
+pub fn read(table: Vec<u8>) -> anyhow::Result<(Plan, Vec<Cell>)> {
     // Some damage makes the crate panic.
-    let table = std::panic::catch_unwind(|| read_whole(from));
+    let table = std::panic::catch_unwind(|| read_whole(table.into()));
     table.unwrap_or_else(|_| bail!("it is damaged"))
 }
 
-fn read_whole(from: impl ChunkReader + 'static) -> anyhow::Result<(Plan, Vec<Cell>)> {
+fn read_whole(bytes: Bytes) -> anyhow::Result<(Plan, Vec<Cell>)> {
     let none = "it is no Parquet file, or not a whole one";
-    let length = from.len();
-    let table = SerializedFileReader::new(from).context(none)?;
-    let plan = plan(table.metadata().file_metadata())?;
-    // Rows of a few bytes may claim to be any number, so they are counted against the plan and the file before and while
-    // they are read.
+    let length = bytes.len();
+    let table = SerializedFileReader::new(bytes).context(none)?;
+    let metadata = table.metadata().file_metadata();
+    let plan = plan(metadata)?;
+    // A few bytes may claim to be any number of rows, so they are counted against plan and file before memory is taken.
     let few = "its rows are not the cells of its plan";
     ensure!(
-        table.metadata().file_metadata().num_rows() == plan.cells() as i64
-            && plan.cells() as u64 <= MOST_ROWS_A_BYTE * length,
+        metadata.num_rows() == plan.cells() as i64
+            && plan.cells() <= MOST_ROWS_A_BYTE.saturating_mul(length),
         few
     );
+    ensure!(
+        *metadata.schema() == schema(&columns(&[])?)? && table.num_row_groups() == 1,
+        "its columns are not those of a map"
+    );
+    check_pages(&*table.get_row_group(0)?, plan.cells())?;
     let mut cells = Vec::with_capacity(plan.cells());
     let mut places = (0..plan.tiles()).flat_map(|tile| plan.places(tile));
     for row in table.get_row_iter(None)? {
@@ -104,12 +121,38 @@ fn read_whole(from: impl ChunkReader + 'static) -> anyhow::Result<(Plan, Vec<Cel
         cells.push(cell);
     }
     ensure!(places.next().is_none(), few);
-    let noted = noted(table.metadata().file_metadata(), CHECKSUM_KEY);
     ensure!(
-        noted == Some(checksum(&plan, &cells)?.as_str()),
+        noted(metadata, CHECKSUM_KEY) == Some(checksum(&plan, &cells)?.as_str()),
         "it is damaged: its cells are not those that were written"
     );
     Ok((plan, cells))
+}
+
+/// The crate takes memory for as many values as a page says that it has.
+fn check_pages(rows: &dyn RowGroupReader, cells: usize) -> anyhow::Result<()> {
+    for column in 0..rows.num_columns() {
+        let mut pages = rows.get_column_page_reader(column)?;
+        while let Some(page) = pages.get_next_page()? {
+            let most = match page {
+                Page::DictionaryPage { .. } => page.buffer().len(),
+                Page::DataPage { .. } | Page::DataPageV2 { .. } => cells,
+            };
+            ensure!(
+                page.num_values() as usize <= most,
+                "it is damaged: a page of {} bytes cannot have {} values",
+                page.buffer().len(),
+                page.num_values()
+            );
+        }
+    }
+    Ok(())
+}
+
+fn schema(columns: &[Column]) -> anyhow::Result<Type> {
+    let fields = columns.iter().map(Column::field);
+    let fields = fields.collect::<Result<Vec<_>, _>>()?;
+    let schema = Type::group_type_builder("map").with_fields(fields);
+    Ok(schema.build()?)
 }
 
 /// The one key of a plan that all versions of the program have.
@@ -317,9 +360,7 @@ mod tests {
     }
 
     fn read_back(bytes: &[u8]) -> anyhow::Result<(Plan, Vec<Cell>)> {
-        let mut file = tempfile::tempfile()?;
-        file.write_all(bytes)?;
-        read(file)
+        read(bytes.to_vec())
     }
 
     fn assert_refused(bytes: &[u8], part: &str) {
