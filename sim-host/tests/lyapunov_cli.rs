@@ -171,7 +171,7 @@ fn a_search_without_result_is_untested_and_names_its_interval() {
 fn stopping_keeps_what_is_done() {
     let folder = folder();
     let range = [
-        "--from", "1501", "--to", "2000", "--step", "0.03", "--time", "3000",
+        "--from", "1501", "--to", "2000", "--step", "0.03", "--time", "600",
     ];
     let outputs = ["--out", "x.csv", "--json", "x.json"];
     // One thread: hundreds of batches, of some hundredths of a second each; those done are kept.

@@ -74,6 +74,9 @@ pub struct Material {
 pub struct Product {
     /// What it was made from: another one makes it anew.
     fingerprint: String,
+    /// CRC-32 of all else and of the figures' files: where a byte of them was changed, it is made anew.
+    #[serde(default)]
+    crc32: String,
     /// Title.
     pub title: String,
     /// Figures: name and caption.
@@ -207,11 +210,12 @@ impl Piece {
         let text = bounded::read_text(&self.record(folder), bounded::TEXT_BYTES).ok()?;
         let product: Product = serde_json::from_str(&text).ok()?;
         let same = product.fingerprint == self.fingerprint(options);
-        let there = |(name, _): &(String, String)| {
-            folder.join(format!("figures/{name}.svg")).exists()
-                && folder.join(format!("figures/{name}.csv")).exists()
+        let whole = || {
+            product
+                .checksum(folder)
+                .is_ok_and(|sum| sum == product.crc32)
         };
-        (same && product.figures.iter().all(there)).then_some(product)
+        (same && whole()).then_some(product)
     }
 
     /// Writes the piece, its record last.
@@ -228,8 +232,9 @@ impl Piece {
             write_text(&at("svg"), &drawing.chart.svg()?, true)?;
             write_text(&at("csv"), &drawing.csv, true)?;
         }
-        let product = Product {
+        let mut product = Product {
             fingerprint: self.fingerprint(options),
+            crc32: String::new(),
             title: self.title.clone(),
             figures: material
                 .drawings
@@ -239,6 +244,7 @@ impl Piece {
             judgements: material.judgements,
             findings: material.findings,
         };
+        product.crc32 = product.checksum(folder)?;
         write_json(&self.record(folder), &product, true)?;
         Ok(product)
     }
@@ -255,6 +261,26 @@ impl Piece {
             env!("CARGO_PKG_VERSION"),
             options.quality
         )
+    }
+}
+
+impl Product {
+    /// Of all but the check sum itself, and of the figures' files.
+    fn checksum(&self, folder: &Path) -> anyhow::Result<String> {
+        const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+        let own = Self {
+            crc32: String::new(),
+            ..self.clone()
+        };
+        let mut digest = CHECKSUM.digest();
+        digest.update(&serde_json::to_vec(&own)?);
+        for (name, _) in &self.figures {
+            for ending in ["svg", "csv"] {
+                let path = folder.join(format!("figures/{name}.{ending}"));
+                digest.update(&bounded::read(&path, bounded::RECORDING_BYTES, |_| true)?);
+            }
+        }
+        Ok(format!("{:08x}", digest.finalize()))
     }
 }
 

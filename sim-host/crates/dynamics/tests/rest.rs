@@ -214,7 +214,8 @@ proptest! {
         if let Some(end) = settled.early_end.or(later) {
             prop_assert_eq!(end.reason, Reason::Diverges);
             let mut reference = Reference::new(&scenario, 1e-9).expect("it is valid");
-            let known = reference.run(end.time_s + 1.0).err().map(|end| end.reason);
+            // Chaos on the way shifts the instant.
+            let known = reference.run(2.0 * end.time_s + 20.0).err().map(|end| end.reason);
             prop_assert_eq!(known, Some(Reason::Diverges), "{} by the reference", end);
             return Ok(());
         }
