@@ -14,11 +14,11 @@ pub struct Spaced {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NotSpaced {
     /// More digits than can be counted in lie between the greatest and the least.
-    TooFarApart,
+    SizesDiffer,
     /// More of them than asked for at most.
-    TooMany,
+    Count,
     /// Neighbours round to the same double.
-    TooClose,
+    SameNumber,
 }
 
 /// Digits of a quotient: more than a double has, and enough to tell on which side of a tie it lies.
@@ -32,12 +32,12 @@ impl Spaced {
     /// See [`NotSpaced`].
     pub fn in_steps(from: f64, to: f64, step: f64, most: usize) -> Result<Self, NotSpaced> {
         if ((to - from) / step).abs() > most as f64 {
-            return Err(NotSpaced::TooMany);
+            return Err(NotSpaced::Count);
         }
         let ([from, to, step], exponent) = scaled([from, to, step])?;
         let steps = (to - from).unsigned_abs() / step.unsigned_abs();
         if steps >= most as u128 {
-            return Err(NotSpaced::TooMany);
+            return Err(NotSpaced::Count);
         }
         let rise = step.abs();
         let below = if to < from { steps as i128 * rise } else { 0 };
@@ -73,10 +73,10 @@ impl Spaced {
             .checked_mul(self.per)
             .and_then(|first| first.checked_add(last.checked_mul(self.rise)?))
             .filter(|sum| sum.checked_mul(10).is_some())
-            .ok_or(NotSpaced::TooFarApart)?;
+            .ok_or(NotSpaced::SizesDiffer)?;
         let same = |k| self.at(k) == self.at(k + 1);
         if self.count > 1 && (same(0) || same(self.count - 2)) {
-            return Err(NotSpaced::TooClose);
+            return Err(NotSpaced::SameNumber);
         }
         Ok(self)
     }
@@ -129,7 +129,7 @@ fn scaled<const N: usize>(numbers: [f64; N]) -> Result<([i128; N], i32), NotSpac
             let scaled = power.and_then(|power| digits.checked_mul(power));
             *multiple = scaled
                 .filter(|n| n.abs() < i128::MAX / 4)
-                .ok_or(NotSpaced::TooFarApart)?;
+                .ok_or(NotSpaced::SizesDiffer)?;
         }
     }
     Ok((multiples, least))
@@ -213,25 +213,25 @@ mod tests {
 
     #[test]
     fn what_cannot_be_counted_is_refused() {
-        assert_eq!(steps(0.0, 1000.0, 1.0), Err(NotSpaced::TooMany));
-        assert_eq!(steps(-1e308, 1e308, 1.0), Err(NotSpaced::TooMany));
+        assert_eq!(steps(0.0, 1000.0, 1.0), Err(NotSpaced::Count));
+        assert_eq!(steps(-1e308, 1e308, 1.0), Err(NotSpaced::Count));
         assert_eq!(
             steps(1.0, 1.000_000_000_000_01, 1e-17),
-            Err(NotSpaced::TooMany)
+            Err(NotSpaced::Count)
         );
         assert_eq!(
             steps(1.0, 1.000_000_000_000_001, 1e-17),
-            Err(NotSpaced::TooClose)
+            Err(NotSpaced::SameNumber)
         );
-        assert_eq!(steps(1e-300, 1.0, 0.1), Err(NotSpaced::TooFarApart));
+        assert_eq!(steps(1e-300, 1.0, 0.1), Err(NotSpaced::SizesDiffer));
         assert_eq!(
             Spaced::between(1e-30, 1e30, 10),
-            Err(NotSpaced::TooFarApart)
+            Err(NotSpaced::SizesDiffer)
         );
-        assert_eq!(Spaced::between(1.0, 1.0, 2), Err(NotSpaced::TooClose));
+        assert_eq!(Spaced::between(1.0, 1.0, 2), Err(NotSpaced::SameNumber));
         assert_eq!(
             Spaced::between(0.0, 1.0, usize::MAX),
-            Err(NotSpaced::TooClose)
+            Err(NotSpaced::SameNumber)
         );
     }
 }

@@ -276,9 +276,9 @@ impl Values {
 
 fn words(fault: NotSpaced) -> &'static str {
     match fault {
-        NotSpaced::TooMany => "these are more than ten million values",
-        NotSpaced::TooFarApart => "the numbers differ too much in size to be counted in decimals",
-        NotSpaced::TooClose => "neighbouring values would be the same number",
+        NotSpaced::Count => "these are more than ten million values",
+        NotSpaced::SizesDiffer => "the numbers differ too much in size to be counted in decimals",
+        NotSpaced::SameNumber => "neighbouring values would be the same number",
     }
 }
 

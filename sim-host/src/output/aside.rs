@@ -54,7 +54,7 @@ impl Aside {
         } else {
             name.persist_noclobber(&self.target)
         };
-        Ok(done.map_err(|error| error.error)?)
+        done.map_err(|error| error.error)
     }
 }
 

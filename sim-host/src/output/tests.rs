@@ -101,18 +101,28 @@ const CASES: [Case; 19] = [
     refused("d/x/y", file, "is no folder"),
 ];
 
-/// Everything in a folder: names, what links point at, modes and contents.
-fn everything(at: &Path) -> Vec<(PathBuf, Option<PathBuf>, u32, Option<Vec<u8>>)> {
-    let mut all: Vec<_> = fs::read_dir(at)
-        .unwrap()
-        .map(|entry| {
-            let path = entry.unwrap().path();
-            let metadata = fs::symlink_metadata(&path).unwrap();
-            let content = metadata.is_file().then(|| fs::read(&path).unwrap());
-            let link = fs::read_link(&path).ok();
-            (path, link, metadata.permissions().mode(), content)
-        })
-        .collect();
+/// What is seen of a file.
+#[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Seen {
+    path: PathBuf,
+    link: Option<PathBuf>,
+    mode: u32,
+    content: Option<Vec<u8>>,
+}
+
+/// Everything in a folder.
+fn everything(at: &Path) -> Vec<Seen> {
+    let seen = |entry: std::io::Result<fs::DirEntry>| {
+        let path = entry.unwrap().path();
+        let metadata = fs::symlink_metadata(&path).unwrap();
+        Seen {
+            link: fs::read_link(&path).ok(),
+            mode: metadata.permissions().mode(),
+            content: metadata.is_file().then(|| fs::read(&path).unwrap()),
+            path,
+        }
+    };
+    let mut all: Vec<_> = fs::read_dir(at).unwrap().map(seen).collect();
     all.sort();
     all
 }
@@ -141,14 +151,13 @@ fn each_kind_of_file_is_written_or_refused_and_then_unchanged() {
                 Ok(()) => {
                     checked.and(written).expect(&context);
                     assert_eq!(fs::read_to_string(at.path().join("d")).unwrap(), NEW);
-                    let mut after = everything(at.path());
-                    after.retain(|(path, ..)| before.iter().any(|(there, ..)| there == path));
-                    let kept = |all: Vec<(PathBuf, _, _, _)>| -> Vec<_> {
-                        all.into_iter()
-                            .map(|(path, link, mode, _)| (path, link, mode))
-                            .collect()
+                    let was_there = |seen: &&Seen| before.iter().any(|b| b.path == seen.path);
+                    let kept = |all: &[Seen]| -> Vec<_> {
+                        let of_file =
+                            |seen: &Seen| (seen.path.clone(), seen.link.clone(), seen.mode);
+                        all.iter().filter(was_there).map(of_file).collect()
                     };
-                    assert_eq!(kept(after), kept(before), "{context}");
+                    assert_eq!(kept(&everything(at.path())), kept(&before), "{context}");
                 }
                 Err(part) => {
                     for error in [checked.unwrap_err(), written.unwrap_err()] {

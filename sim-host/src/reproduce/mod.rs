@@ -81,6 +81,7 @@ pub fn reproduce(
     stop: &AtomicBool,
     on_progress: &(dyn Fn(Progress) + Sync),
 ) -> anyhow::Result<Summary> {
+    page::begin(folder)?;
     let pieces = piece::all(options);
     let of = pieces.len();
     let mut products = Vec::with_capacity(of);

@@ -16,6 +16,16 @@ const TITLE: &str = "Chang's chaotic vehicle and its dither, reproduced";
 /// File with all judgements, which every reproduction has.
 pub const CLAIMS: &str = "claims.json";
 
+/// Makes the folder, and marks it as that of a reproduction before there are claims.
+pub fn begin(folder: &Path) -> anyhow::Result<()> {
+    make_folder(folder)?;
+    let claims = folder.join(CLAIMS);
+    if !claims.exists() {
+        write_json(&claims, &Vec::<Judgement>::new(), true)?;
+    }
+    Ok(())
+}
+
 /// Writes `index.html` and the claims.
 pub fn write(
     folder: &Path,
@@ -23,7 +33,6 @@ pub fn write(
     products: &[Product],
     judgements: &[Judgement],
 ) -> anyhow::Result<()> {
-    make_folder(folder)?;
     write_json(&folder.join(CLAIMS), &judgements, true)?;
     let mut pieces = Vec::new();
     for product in products {
