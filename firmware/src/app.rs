@@ -151,7 +151,7 @@ fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             fastest_rate_per_s,
             fastest_rate_per_s / rate_hz,
             MOST_STEP_TIMES_RATE,
-            least_rate_hz(*fastest_rate_per_s)
+            least_rate_hz(fastest_rate_per_s)
         ),
     }
     ExitCode::BadScenario
