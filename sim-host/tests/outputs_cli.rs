@@ -89,6 +89,19 @@ fn folders_are_checked_before_the_work() {
     assert_eq!(fs::read_dir(at).unwrap().count(), 1);
 }
 
+/// In milliseconds, and not after minutes on the host.
+#[test]
+fn inputs_are_found_missing_before_the_work() {
+    let folder = folder();
+    let start = std::time::Instant::now();
+    assert_refused(
+        folder.path(),
+        words("faults --firmware none.elf"),
+        &["none.elf", "No such file"],
+    );
+    assert!(start.elapsed().as_secs() < 10);
+}
+
 #[test]
 fn what_is_read_is_not_overwritten() {
     let folder = folder();

@@ -10,6 +10,7 @@ use serde::Serialize;
 use sim_host::closed_loop::fault::campaign::{self, Clean, Row, Total, totals};
 use sim_host::closed_loop::fault::catalogue::{self, Class};
 use sim_host::closed_loop::fault::manoeuvres;
+use sim_host::pil::elf::Image;
 use sim_host::report::fault_matrix;
 use sim_host::words::counted;
 use std::collections::{BTreeMap, BTreeSet};
@@ -60,8 +61,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let firmware = named("--firmware", &arguments.firmware);
     arguments.destinations.check(firmware)?;
     let limit = time_out(arguments.time_out)?;
+    // Before the minutes of work on the host.
+    let image = arguments.firmware.as_deref().map(Image::open).transpose()?;
     let mut rows = on_host(arguments.quick)?;
-    match &arguments.firmware {
+    match image {
         Some(image) => rows.extend(processor::inject(image, arguments.quick, limit)?),
         None => eprintln!("no --firmware: no faults of memory and core"),
     }
@@ -107,13 +110,12 @@ mod processor {
     use sim_host::pil::elf::Image;
     use sim_host::pil::qemu::{Machine, RunError};
     use sim_host::pil::session::LinkKind;
-    use std::path::Path;
     use std::time::Duration;
 
     /// Faults of memory and core, each in an emulator of its own.
-    pub fn inject(image: &Path, quick: bool, time_out: Duration) -> anyhow::Result<Vec<Row>> {
+    pub fn inject(image: Image, quick: bool, time_out: Duration) -> anyhow::Result<Vec<Row>> {
         let target = Target {
-            image: Image::open(image)?,
+            image,
             machine: Machine::Mps2An386,
             link: LinkKind::Timed,
             time_out,
