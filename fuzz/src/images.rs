@@ -19,7 +19,7 @@ pub const ELF: Target = Target {
     seeds: || vec![image(&[]), image(FORMATS)],
     // Functions of 16 bytes in the file with names of a kilobyte, and problems in words.
     multiple: 512,
-    mutations: 10_000,
+    mutations: 50_000,
 };
 
 /// The console of an image.
@@ -34,7 +34,7 @@ pub const LOG: Target = Target {
         ])]
     },
     multiple: 64,
-    mutations: 20_000,
+    mutations: 100_000,
 };
 
 /// Name, address, and code of each function.

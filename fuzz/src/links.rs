@@ -19,17 +19,17 @@ pub const SERIAL: Target = Target {
     repair: repair_serial,
     seeds: || vec![line(&[&[1, 0, 2], &[0; BODY_MAX], &[7; TO_HOST_LEN]])],
     multiple: 0,
-    mutations: 40_000,
+    mutations: 200_000,
 };
 
 /// Frames, of sensors and of the actuator in turn.
 pub const FRAMES: Target = Target {
     name: "frames",
     read: read_frames,
-    repair: repair_frames,
+    repair: |bytes| repair_frames(bytes),
     seeds: frame_seeds,
     multiple: 0,
-    mutations: 40_000,
+    mutations: 200_000,
 };
 
 fn read_serial(bytes: &[u8]) {
@@ -85,7 +85,7 @@ fn read_frames(bytes: &[u8]) {
 }
 
 /// The profile's check sum: of the frame after it, and of the data ID.
-fn repair_frames(bytes: &mut Vec<u8>) {
+fn repair_frames(bytes: &mut [u8]) {
     const CHECKSUM: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
     for (k, frame) in bytes.as_chunks_mut::<FRAME_LEN>().0.iter_mut().enumerate() {
         let (sum, covered) = frame.split_at_mut(2);
@@ -106,5 +106,5 @@ fn frame_seeds() -> Vec<Vec<u8>> {
     };
     let mut senders = [0, 1].map(|k| Sender::new(data_id(k)));
     let mut one = |k: usize| encode_measurement(&measurement, &mut senders[k % 2]);
-    vec![(0..8).flat_map(|k| one(k)).collect()]
+    vec![(0..8).flat_map(&mut one).collect()]
 }

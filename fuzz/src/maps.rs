@@ -27,7 +27,7 @@ pub const TILE: Target = Target {
     },
     // Copies of the text, and a row of CSV as a cell.
     multiple: 24,
-    mutations: 20_000,
+    mutations: 100_000,
 };
 
 /// A map as Parquet.
@@ -38,7 +38,7 @@ pub const PARQUET: Target = Target {
     seeds: || vec![parquet()],
     // Rows that a few bits stand for, as cells.
     multiple: 4096,
-    mutations: 4_000,
+    mutations: 20_000,
 };
 
 /// A small map.

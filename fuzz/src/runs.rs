@@ -18,11 +18,11 @@ use sim_host::pil::telemetry;
 pub const TELEMETRY: Target = Target {
     name: "telemetry",
     read: read_telemetry,
-    repair: repair_telemetry,
+    repair: |bytes| repair_telemetry(bytes),
     seeds: telemetry_seeds,
     // Records and duty codes as read, the motion of them in f64, and a copy of the codes.
     multiple: 8,
-    mutations: 40_000,
+    mutations: 200_000,
 };
 
 /// A recording of the loop.
@@ -33,7 +33,7 @@ pub const RECORDING: Target = Target {
     seeds: recording_seeds,
     // The scenario's text as tables, and the exchanges twice.
     multiple: 64,
-    mutations: 2_000,
+    mutations: 10_000,
 };
 
 /// Most exchanges that are replayed.
@@ -53,7 +53,7 @@ fn read_telemetry(bytes: &[u8]) {
 }
 
 /// CRC-16 of the frames' last two bytes, as they follow each other.
-fn repair_telemetry(bytes: &mut Vec<u8>) {
+fn repair_telemetry(bytes: &mut [u8]) {
     const CHECKSUM: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
     let samples = bytes
         .get(3..5)

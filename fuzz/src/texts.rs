@@ -22,7 +22,7 @@ pub const CONFIGURATION: Target = Target {
     },
     // Each letter may be a key of its own, with an empty table.
     multiple: 1024,
-    mutations: 4_000,
+    mutations: 20_000,
 };
 
 /// A manoeuvre.
@@ -32,7 +32,7 @@ pub const MANOEUVRE: Target = Target {
     repair: as_it_is,
     seeds: manoeuvres,
     multiple: 1024,
-    mutations: 4_000,
+    mutations: 20_000,
 };
 
 /// The record of a piece of the reproduction.
@@ -46,7 +46,7 @@ pub const RECORD: Target = Target {
         vec![record.into()]
     },
     multiple: 64,
-    mutations: 20_000,
+    mutations: 100_000,
 };
 
 /// Settings of the firmware, one a line.
@@ -62,7 +62,7 @@ pub const SETTINGS: Target = Target {
         ]
     },
     multiple: 0,
-    mutations: 20_000,
+    mutations: 100_000,
 };
 
 fn read_configuration(bytes: &[u8]) {

@@ -114,6 +114,63 @@ fn recursion_in_the_code_is_found() {
     assert!(!stack.fits());
 }
 
+/// Symbols of one name at every other half-word of 64 KiB of code, each of that size.
+fn many(name: &str, symbols: u64, size: u64) -> Vec<u8> {
+    let mut object = Object::new(BinaryFormat::Elf, Architecture::Arm, Endianness::Little);
+    let text = object.add_section(Vec::new(), b".text".to_vec(), SectionKind::Text);
+    object.set_section_data(text, vec![0; 1 << 16], 4);
+    let frames = object.add_section(Vec::new(), b".stack_sizes".to_vec(), SectionKind::Other);
+    object.set_section_data(frames, vec![1, 1, 0, 0, 8], 1);
+    for k in 0..symbols {
+        object.add_symbol(Symbol {
+            name: name.as_bytes().to_vec(),
+            value: (4 * k) | 1,
+            size,
+            kind: SymbolKind::Text,
+            scope: SymbolScope::Linkage,
+            weak: false,
+            section: SymbolSection::Section(text),
+            flags: SymbolFlags::None,
+        });
+    }
+    object.write().expect("the image can be written")
+}
+
+/// What a small file says of itself may be read for hours and fill all memory.
+#[test]
+fn names_and_functions_that_overlap_are_refused() {
+    for (image, what) in [
+        (many(&"n".repeat(1 << 16), 10_000, 4), "names"),
+        (many("n", 10_000, 1 << 16), "functions"),
+    ] {
+        let error = Stack::analyse(&image).expect_err("it is damaged");
+        assert!(
+            matches!(error, AnalysisError::Overlap(found) if found == what),
+            "{error}"
+        );
+    }
+    // As a linker lays them out.
+    let error = Stack::analyse(&many("n", 10_000, 4)).expect_err("it lacks a symbol");
+    assert!(matches!(error, AnalysisError::NoSymbol(_)), "{error}");
+}
+
+/// Eight bytes of a mangled name stand for twice as much as the eight before.
+#[test]
+fn names_that_grow_are_cut() {
+    let mut name = String::from("_RMC0");
+    for _ in 0..30 {
+        name.insert_str(2, "TB_B_");
+    }
+    for name in [name, "_ZN3foo3barE".into(), "é".repeat(2000)] {
+        let names = sim_host::image::function_names(&many(&name, 3, 4)).expect("it can be read");
+        assert!(
+            names
+                .iter()
+                .all(|name| !name.is_empty() && name.len() <= 1024)
+        );
+    }
+}
+
 #[test]
 fn without_frames_there_is_no_bound() {
     let error = Stack::analyse(&image(&CODE, false)).expect_err("nothing states the frames");

@@ -355,6 +355,30 @@ mod tests {
         assert_eq!(worst(&graph(functions, &[2, 4])).levels[0].bytes, 208);
     }
 
+    /// A hostile image has one in a megabyte.
+    #[test]
+    fn a_chain_of_calls_takes_no_stack_of_this_program() {
+        let length = 200_000;
+        let calls: Vec<[u32; 1]> = (0..length).map(|k| [2 * k + 2]).collect();
+        let mut functions: Vec<(u32, u32, &[u32], u32)> = (0..length)
+            .zip(&calls)
+            .map(|(k, called)| (2 * k, 1, &called[..], 0))
+            .collect();
+        functions.push((2 * length, 1, &[], 0));
+        let stack = worst(&graph(&functions, &[]));
+        assert_eq!(stack.problems, [] as [&str; 0]);
+        assert_eq!(stack.levels[0].bytes, length + 1);
+        assert_eq!(stack.levels[1].bytes, length + 1 - 4);
+    }
+
+    #[test]
+    fn recursion_through_a_pointer_has_no_bound() {
+        let functions: &[(u32, u32, &[u32], u32)] =
+            &[(0, 8, &[], 1), (2, 8, &[], 1), (8, 8, &[], 0)];
+        let problems = worst(&graph(functions, &[2])).problems;
+        assert_eq!(problems, ["f2 calls itself"]);
+    }
+
     #[test]
     fn recursion_has_no_bound() {
         let functions: &[(u32, u32, &[u32], u32)] = &[
