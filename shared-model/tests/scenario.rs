@@ -4,6 +4,7 @@ use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::parameter::ParameterSet;
 use shared_model::settings::{Choice, SettingError};
+use shared_model::short::Short;
 use shared_model::tire::TireModel;
 use shared_model::vehicle::SlipForm;
 use shared_model::{InvalidScenario, Preset, Real, Scenario};
@@ -76,7 +77,10 @@ fn ranges<T: Neighbours, P: ParameterSet<T>>(
             assert_eq!(error.value.to_bits(), bad.to_f64().to_bits());
             let message = format!(
                 "{section}.{} = {}: must be a finite number from {} to {}",
-                field.name, error.value, field.min, field.max
+                field.name,
+                Short(error.value),
+                Short(field.min),
+                Short(field.max)
             );
             assert_eq!(error.to_string(), message);
         }
