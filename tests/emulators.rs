@@ -229,7 +229,13 @@ fn an_image_without_symbols_runs_without_log() {
     bytes[0x20..0x24].fill(0);
     bytes[0x30..0x34].fill(0);
     fs::write(real.path().join("stripped"), bytes).expect("it can be written");
-    let short = ["qemu", "stripped", "run.duration_s=0.1", "telemetry=t.bin"];
+    let short = [
+        "qemu",
+        "--force",
+        "stripped",
+        "run.duration_s=0.1",
+        "telemetry=t.bin",
+    ];
     let output = command(&real, &short).output().expect("the program starts");
     let (code, message) = ended(&output);
     assert_eq!(code, Some(0), "{message}");

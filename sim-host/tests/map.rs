@@ -125,7 +125,7 @@ fn edited_tiles_are_refused() {
     };
     for (edited, part) in [
         (without_sheets, "0 sheets"),
-        (whole.replacen(count, r#""count":0"#, 2), "0 cells"),
+        (whole.replacen(count, r#""count":0"#, 2), "0 values"),
         (
             whole.replacen(count, r#""count":1000000000000"#, 2),
             "ten million",

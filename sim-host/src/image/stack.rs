@@ -79,10 +79,11 @@ impl Stack {
     /// # Errors
     /// If it is damaged, was compiled without the functions' frames, or lacks a symbol that every image of the firmware has.
     pub fn analyse(bytes: &[u8]) -> Result<Self, AnalysisError> {
+        let graph = CallGraph::read(bytes)?;
         let file = super::parse(bytes)?;
         let room =
             address_of(&file, "_stack_start")?.saturating_sub(address_of(&file, "_stack_end")?);
-        Self::of(&CallGraph::read(bytes)?, &LEVELS, room as u32)
+        Self::of(&graph, &LEVELS, room as u32)
     }
 
     /// Whether the figure is a bound, and there is RAM for it.
