@@ -128,11 +128,11 @@ fn edited_tiles_are_refused() {
         (whole.replacen(count, r#""count":0"#, 2), "0 values"),
         (
             whole.replacen(count, r#""count":1000000000000"#, 2),
-            "ten million",
+            "1 to 10000000",
         ),
         (
             whole.replacen(count, r#""count":9223372036854775808"#, 2),
-            "ten million",
+            "the same number",
         ),
         (whole.replacen(count, r#""count":4"#, 1), "not complete"),
         (number(r#""observed_s":"#, "-2.0"), "transient"),
