@@ -4,7 +4,7 @@ use super::piece::{Drawing, Material, Named, Table};
 use super::{Made, Quality};
 use crate::averaging;
 use crate::chaos::period::{TOLERANCE, period};
-use crate::chaos::sweep::{SweepError, Watch};
+use crate::chaos::sweep::Watch;
 use crate::report::chart::{AxisSpec, Chart, Look, Panel, Series};
 use crate::simulate::{settle, simulate, started_at};
 use crate::trace::Trace;
@@ -157,7 +157,7 @@ pub fn averaging(named: &Named, quality: Quality, watch: Watch) -> Made {
     ]);
     for (waveform, amplitude_v, _) in CONTROLLED {
         let scenario = dithered(&named.scenario, waveform, amplitude_v);
-        let compared = averaging::compare(&scenario, &frequencies).map_err(SweepError::from)?;
+        let compared = averaging::compare(&scenario, &frequencies)?;
         (watch.done)();
         let mut curves = [Vec::new(), Vec::new()];
         for one in &compared {
