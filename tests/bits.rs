@@ -1,18 +1,19 @@
 //! Level 1 of the equivalence: the firmware's f32 run equals the host's, word for word, in every form of the model.
 
+use dynamics::simulate::simulate;
+use dynamics::trace::Trace;
+use pil::equivalence::bits;
+use pil::equivalence::trace_of;
+use qemu::Machine;
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::tire::TireModel;
 use shared_model::vehicle::SlipForm;
-use sim_host::equivalence::bits;
-use sim_host::pil::qemu::Machine;
-use sim_host::simulate::simulate;
-use sim_host::trace::Trace;
 use tests::{record, scenario};
 
 fn assert_same_bits(scenario: &Scenario<f32>, machine: Machine) {
-    let firmware = record(scenario, machine, 0).trace();
+    let firmware = trace_of(&record(scenario, machine, 0));
     let host = simulate(scenario).expect("the scenario is valid");
     let bits = bits(&firmware, &host);
     assert_eq!(bits.differing, 0, "{:?} in {scenario:?}", bits.first);
@@ -91,7 +92,7 @@ fn the_same_run_twice_gives_the_same_telemetry() {
 fn one_flipped_bit_is_seen() {
     let scenario = scenario(Waveform::Square, Application::Averaged);
     let host = simulate(&scenario).expect("the scenario is valid");
-    let firmware = record(&scenario, Machine::Mps2An386, 0).trace();
+    let firmware = trace_of(&record(&scenario, Machine::Mps2An386, 0));
     let differing = |change: &dyn Fn(&mut Trace)| {
         let mut changed = firmware.clone();
         change(&mut changed);

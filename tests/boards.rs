@@ -1,16 +1,17 @@
 //! The same ECU on other boards: an STM32F405 whose timer is looked at from outside, and the images of all boards.
 
+use dynamics::simulate::simulate;
+use pil::equivalence::bits;
+use pil::equivalence::trace_of;
+use qemu::debug::Debugged;
+use qemu::gdb::{Register, Stop};
+use qemu::telemetry::Recording;
+use qemu::{Machine, SocketError};
+use qemu::{qmp::Qmp, settings};
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::open_loop::OpenLoop;
-use sim_host::equivalence::bits;
-use sim_host::pil::debug::Debugged;
-use sim_host::pil::gdb::{Register, Stop};
-use sim_host::pil::qemu::{Machine, SocketError};
-use sim_host::pil::telemetry::Recording;
-use sim_host::pil::{qmp::Qmp, settings};
-use sim_host::simulate::simulate;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tests::{TELEMETRY, TIME_OUT, board_image, record, run};
@@ -44,7 +45,7 @@ fn the_same_program_gives_the_same_bits() {
         for law in [FrictionLaw::CoulombRate, FrictionLaw::PrintedAngle] {
             let mut scenario = scenario(waveform);
             scenario.friction.law = law;
-            let firmware = record(&scenario, STM32F405, 0).trace();
+            let firmware = trace_of(&record(&scenario, STM32F405, 0));
             let host = simulate(&scenario).expect("the scenario is valid");
             let bits = bits(&firmware, &host);
             assert_eq!(bits.differing, 0, "{:?} in {scenario:?}", bits.first);
@@ -92,7 +93,7 @@ fn every_duty_is_in_the_timers_register() {
         assert_ne!(found, expected_registers(&other));
 
         assert_eq!(run.finish(TIME_OUT).expect("the run ends").exit_code, 0);
-        let firmware = open(folder.path()).trace();
+        let firmware = trace_of(&open(folder.path()));
         let host = simulate(&scenario).expect("the scenario is valid");
         let bits = bits(&firmware, &host);
         assert_eq!(bits.differing, 0, "{:?}", bits.first);

@@ -1,6 +1,6 @@
 //! What Rust costs on the target: the model's step and the ECU program's tasks beside the same in C, whose bits are equal.
 
-use sim_host::pil::qemu::Machine;
+use qemu::Machine;
 use std::collections::BTreeMap;
 use std::process::Command;
 use tests::golden::{Figure, check_figures};

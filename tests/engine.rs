@@ -1,8 +1,8 @@
 //! Instructions of the host's integrator, counted by callgrind, so that a slower engine shows without a clock.
 
+use engine::taylor::{Ensemble, Observables, Span};
 use shared_model::Scenario;
 use shared_model::friction::FrictionLaw;
-use sim_host::engine::taylor::{Motions, Span, Watched};
 use std::process::Command;
 use tests::golden::{Figure, check_figures};
 
@@ -12,7 +12,7 @@ const COUNTER: &str = "valgrind";
 const TIME_S: f64 = 20.0;
 
 /// 16 motions from 1600 to 1900 rpm.
-fn motions(law: FrictionLaw) -> Motions {
+fn motions(law: FrictionLaw) -> Ensemble {
     let scenario = |k: u32| {
         let mut scenario = Scenario::reconstruction();
         scenario.friction.law = law;
@@ -20,19 +20,19 @@ fn motions(law: FrictionLaw) -> Motions {
         scenario
     };
     let scenarios: Vec<_> = (0..16).map(scenario).collect();
-    Motions::new(&scenarios).expect("all fit")
+    Ensemble::new(&scenarios).expect("all fit")
 }
 
 fn span(yaw_rate_turns: bool) -> Span {
     Span {
         time_s: TIME_S,
         tolerance: 1e-10,
-        watched: Watched {
+        observables: Observables {
             turns: [false, yaw_rate_turns, false, false],
             section: None,
         },
         warm_up_s: 2.0,
-        pieces: 4,
+        segments: 4,
     }
 }
 
@@ -47,31 +47,31 @@ fn nothing() {
 #[test]
 #[ignore = "counted by the test below"]
 fn states() {
-    motions(FrictionLaw::None).follow::<0>(&span(false));
+    motions(FrictionLaw::None).integrate::<0>(&span(false));
 }
 
 #[test]
 #[ignore = "counted by the test below"]
 fn states_and_turns() {
-    motions(FrictionLaw::None).follow::<0>(&span(true));
+    motions(FrictionLaw::None).integrate::<0>(&span(true));
 }
 
 #[test]
 #[ignore = "counted by the test below"]
 fn largest_exponent() {
-    motions(FrictionLaw::None).follow::<1>(&span(false));
+    motions(FrictionLaw::None).integrate::<1>(&span(false));
 }
 
 #[test]
 #[ignore = "counted by the test below"]
 fn spectrum() {
-    motions(FrictionLaw::None).follow::<4>(&span(false));
+    motions(FrictionLaw::None).integrate::<4>(&span(false));
 }
 
 #[test]
 #[ignore = "counted by the test below"]
 fn friction() {
-    motions(FrictionLaw::CoulombRate).follow::<0>(&span(false));
+    motions(FrictionLaw::CoulombRate).integrate::<0>(&span(false));
 }
 
 /// Instructions of this program when it runs one of the above.

@@ -1,10 +1,10 @@
 //! Faults of the firmware: the PWM goes neutral first, then a distinct exit code; the runner never hangs and leaves no
 //! emulator behind.
 
+use qemu::telemetry::Recording;
+use qemu::{Machine, RunError};
 use shared_model::Scenario;
 use shared_model::tire::TireModel;
-use sim_host::pil::qemu::{Machine, RunError};
-use sim_host::pil::telemetry::Recording;
 use std::process::Command;
 use std::time::{Duration, Instant};
 use tests::{TIME_OUT, image, record, run, sim_host};

@@ -1,18 +1,18 @@
 //! The firmware in the loop: the same commands as the program on the host, over every link and on every board that the emulator
 //! has, twice the same bytes, and a clear end where the firmware is dead.
 
+use pil::drive::{Drive, ecu_scenario};
+use pil::ecu::Software;
+use pil::levels::{Levels, ProcessorRun, Target, drive, on_processor};
+use pil::manoeuvre::{Manoeuvre, load};
+use pil::recording::Recording;
+use pil::run::{Depth, compare, run};
+use qemu::session::{LinkKind, Session};
+use qemu::{Machine, RunError};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::frame::decode_actuation;
 use shared_model::signal::Mode;
-use sim_host::closed_loop::drive::{Drive, ecu_scenario};
-use sim_host::closed_loop::ecu::Software;
-use sim_host::closed_loop::levels::{Levels, ProcessorRun, Target, drive, on_processor};
-use sim_host::closed_loop::manoeuvre::{Manoeuvre, load};
-use sim_host::closed_loop::recording::Recording;
-use sim_host::closed_loop::run::{Depth, compare, run};
-use sim_host::pil::qemu::{Machine, RunError};
-use sim_host::pil::session::{LinkKind, Session};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tests::{board_image, image};
@@ -211,7 +211,7 @@ fn a_firmware_that_dies_or_refuses_is_said() {
     );
 
     // The host that stops answering is noticed when the pipes close; the emulator ends with the session.
-    let settings = sim_host::pil::settings::of(&ecu);
+    let settings = qemu::settings::of(&ecu);
     let mut session = start(&[], &settings).expect("it starts");
     session.receive().expect("the first period");
     let error = session.receive().expect_err("it waits for its answer");

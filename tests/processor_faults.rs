@@ -1,16 +1,16 @@
 //! Faults of the ECU's processor, done to the firmware through the emulator's gdb stub; and faults between vehicle and ECU, which
 //! the firmware takes as the host's program does, bit for bit.
 
+use pil::fault::campaign::Row;
+use pil::fault::catalogue::{self, Kind};
+use pil::fault::judge::{Finder, Reaction, Verdict};
+use pil::fault::memory::{Region, flips};
+use pil::fault::processor::{Action, BENCH_TICKS, Bench};
+use pil::levels::Target;
+use qemu::Machine;
+use qemu::session::LinkKind;
 use shared_model::frame::decode_actuation;
 use shared_model::signal::Mode;
-use sim_host::closed_loop::fault::campaign::Row;
-use sim_host::closed_loop::fault::catalogue::{self, Kind};
-use sim_host::closed_loop::fault::judge::{Finder, Reaction, Verdict};
-use sim_host::closed_loop::fault::memory::{Region, flips};
-use sim_host::closed_loop::fault::processor::{Action, BENCH_TICKS, Bench};
-use sim_host::closed_loop::levels::Target;
-use sim_host::pil::qemu::Machine;
-use sim_host::pil::session::LinkKind;
 use std::collections::BTreeSet;
 use tests::{TIME_OUT, image};
 

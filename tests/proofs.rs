@@ -1,18 +1,19 @@
 //! What is shown of the firmware's images: worst stack, size, instructions of the tasks, spacing of interrupts.
 
+use image::Image;
+use image::memory::Map;
+use image::stack::Stack;
+use pil::drive::{Drive, ecu_scenario};
+use pil::instructions::{Instructions, median, most};
+use pil::levels::{Target, on_processor};
+use pil::manoeuvre::{self, Manoeuvre};
+use qemu::Machine;
+use qemu::session::LinkKind;
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::tire::TireModel;
 use shared_model::vehicle::SlipForm;
-use sim_host::closed_loop::drive::{Drive, ecu_scenario};
-use sim_host::closed_loop::levels::{Target, on_processor};
-use sim_host::closed_loop::manoeuvre::{self, Manoeuvre};
-use sim_host::image::memory::Map;
-use sim_host::image::stack::Stack;
-use sim_host::instructions::{Instructions, median, most};
-use sim_host::pil::elf::Image;
-use sim_host::pil::qemu::Machine;
-use sim_host::pil::session::LinkKind;
+use sim_host::firmware::PRIORITIES;
 use std::fs;
 use tests::golden::{Figure, check_figures};
 use tests::{TIME_OUT, board_image, framed_image, image, record, root, scenario};
@@ -35,7 +36,8 @@ fn memory_map(board: &str) -> Map {
 }
 
 fn proven_stack(board: &str, framed: &Image) -> Stack {
-    let stack = Stack::analyse(&framed.bytes).unwrap_or_else(|error| panic!("{board}: {error}"));
+    let stack = Stack::analyse(&framed.bytes, &PRIORITIES)
+        .unwrap_or_else(|error| panic!("{board}: {error}"));
     assert_eq!(
         stack.problems,
         [] as [&str; 0],
@@ -184,7 +186,7 @@ fn no_panic_is_in_the_panic_free_image() {
 }
 
 fn function_names(image: &Image) -> Vec<String> {
-    sim_host::image::function_names(&image.bytes).expect("the image can be read")
+    image::function_names(&image.bytes).expect("the image can be read")
 }
 
 fn instruction_figures(run: &str, instructions: &Instructions) -> Vec<Figure> {

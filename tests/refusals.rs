@@ -1,7 +1,7 @@
 //! The firmware checks its scenario on the target and refuses a bad one with a named error and an exit code.
 
+use qemu::Machine;
 use shared_model::Scenario;
-use sim_host::pil::qemu::Machine;
 use tests::{TIME_OUT, image, run};
 
 const BAD_SCENARIO: i32 = 10;
@@ -101,7 +101,7 @@ fn words(sentence: &str) -> Vec<String> {
 fn host_and_firmware_refuse_the_same_in_the_same_words() {
     let mut cases: Vec<Vec<String>> = Vec::new();
     // Every number there is, just and far outside its range.
-    for setting in sim_host::pil::settings::of(&Scenario::<f32>::reconstruction()) {
+    for setting in qemu::settings::of(&Scenario::<f32>::reconstruction()) {
         let (key, value) = setting.split_once('=').expect("it is a setting");
         if value.parse::<f32>().is_ok() && key != "servo.timer_clock_hz" {
             cases.extend(["-1e30", "3e38", "nan"].map(|bad| vec![format!("{key}={bad}")]));

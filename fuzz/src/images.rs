@@ -1,13 +1,14 @@
 //! Images of the firmware, and the log that one of them writes.
 
 use crate::{Target, as_it_is};
+use image::Image;
+use image::stack::Stack;
 use object::write::{Object, Symbol, SymbolSection};
 use object::{
     Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, SymbolKind, SymbolScope,
 };
-use sim_host::image::stack::Stack;
-use sim_host::pil::elf::Image;
-use sim_host::pil::log::LogDecoder;
+use qemu::log::LogDecoder;
+use sim_host::firmware::PRIORITIES;
 use std::path::PathBuf;
 use std::sync::LazyLock;
 
@@ -130,8 +131,8 @@ fn read_elf(bytes: &[u8]) {
         image.symbols();
         image.find_code([0xB5, 0x80]);
         image.address_of("Reset");
-        let _ = Stack::analyse(&image.bytes);
-        let _ = sim_host::image::function_names(&image.bytes);
+        let _ = Stack::analyse(&image.bytes, &PRIORITIES);
+        let _ = image::function_names(&image.bytes);
         // An image that is run is a program that is trusted, so its log's formats are: they are only read here.
         let _ = LogDecoder::new(&image);
     }

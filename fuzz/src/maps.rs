@@ -1,12 +1,12 @@
 //! What a map is kept in: tiles, and the Parquet file that a schedule begins with.
 
 use crate::{Target, as_it_is};
+use dynamics::map::cell::{Cell, cells};
+use dynamics::map::plan::{Grid, Plan, Sheet, Start};
+use dynamics::map::{table, tiles};
+use dynamics::sweep::Timing;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use sim_host::chaos::sweep::Timing;
-use sim_host::map::cell::{Cell, cells};
-use sim_host::map::plan::{Grid, Plan, Sheet, Start};
-use sim_host::map::{table, tiles};
 use std::sync::LazyLock;
 
 /// A tile.
@@ -18,13 +18,7 @@ pub const TILE: Target = Target {
             *bytes = tiles::resealed(text).into();
         }
     },
-    seeds: || {
-        vec![
-            tiles::text(0, &MAP.0, &MAP.1)
-                .expect("it is written to memory")
-                .into(),
-        ]
-    },
+    seeds: || vec![tiles::text(0, &MAP.0, &MAP.1).into()],
     // Copies of the text, and a row of CSV as a cell.
     multiple: 24,
     mutations: 100_000,

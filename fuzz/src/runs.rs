@@ -1,18 +1,19 @@
 //! What the firmware tells: telemetry, and all that passes in the loop.
 
 use crate::Target;
+use pil::drive::{Drive, ecu_scenario};
+use pil::ecu::Software;
+use pil::equivalence::trace_of;
+use pil::manoeuvre::Manoeuvre;
+use pil::recording::{MAGIC, Recording};
+use pil::run::{Depth, compare, run};
+use qemu::telemetry;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::exchange::PACKET_LEN;
 use shared_model::friction::FrictionMode;
 use shared_model::telemetry::{HEADER_LEN, Header, Record, TRAILER_LEN, Trailer, record_len};
 use shared_model::vehicle::State;
-use sim_host::closed_loop::drive::{Drive, ecu_scenario};
-use sim_host::closed_loop::ecu::Software;
-use sim_host::closed_loop::manoeuvre::Manoeuvre;
-use sim_host::closed_loop::recording::{MAGIC, Recording};
-use sim_host::closed_loop::run::{Depth, compare, run};
-use sim_host::pil::telemetry;
 
 /// A telemetry file.
 pub const TELEMETRY: Target = Target {
@@ -41,7 +42,7 @@ const REPLAYED: usize = 2_000;
 
 fn read_telemetry(bytes: &[u8]) {
     if let Ok(recording) = telemetry::Recording::decode(bytes) {
-        let trace = recording.trace();
+        let trace = trace_of(&recording);
         // As the table of `decode` has it.
         let duties = trace.duties.chunks(trace.samples_per_step);
         assert_eq!(duties.count(), trace.states.len());

@@ -1,11 +1,11 @@
 //! Texts: configurations, manoeuvres, settings, and what a reproduction keeps of its work.
 
 use crate::{Target, as_it_is};
+use dynamics::config;
+use pil::drive::{Drive, ecu_scenario};
+use pil::ecu::Software;
+use pil::manoeuvre;
 use shared_model::Scenario;
-use sim_host::closed_loop::drive::{Drive, ecu_scenario};
-use sim_host::closed_loop::ecu::Software;
-use sim_host::closed_loop::manoeuvre;
-use sim_host::config;
 use sim_host::reproduce::Product;
 
 /// A configuration.
@@ -55,7 +55,7 @@ pub const SETTINGS: Target = Target {
     read: read_settings,
     repair: as_it_is,
     seeds: || {
-        let all = sim_host::pil::settings::of(&Scenario::reconstruction());
+        let all = qemu::settings::of(&Scenario::reconstruction());
         vec![
             all.join("\n").into(),
             b"preset=printed\nrun.duration_s=1e-4".into(),

@@ -90,13 +90,11 @@ fn repaired_inputs_are_read() {
     for (name, is_read) in [
         (
             "telemetry",
-            (|b| sim_host::pil::telemetry::Recording::decode(b).is_ok()) as fn(&[u8]) -> bool,
+            (|b| qemu::telemetry::Recording::decode(b).is_ok()) as fn(&[u8]) -> bool,
         ),
-        ("recording", |b| {
-            sim_host::closed_loop::recording::Recording::read(b).is_ok()
-        }),
+        ("recording", |b| pil::recording::Recording::read(b).is_ok()),
         ("tile", |b| {
-            sim_host::map::tiles::parsed(std::str::from_utf8(b).unwrap()).is_ok()
+            dynamics::map::tiles::parsed(std::str::from_utf8(b).unwrap()).is_ok()
         }),
     ] {
         let target = Target::find(name).unwrap();

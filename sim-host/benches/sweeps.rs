@@ -2,6 +2,12 @@
 //! limit.
 
 use clap::Parser;
+use dynamics::map::cell::{Cell, cells};
+use dynamics::map::plan::{Grid, Plan, Sheet, Start};
+use dynamics::sweep::{RunControl, Timing};
+use engine::Stepper;
+use engine::reference::Reference;
+use engine::taylor::{Ensemble, ORDER, Observables, Span, Trajectory};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::ThreadPoolBuilder;
 use rustix::time::{ClockId, clock_gettime};
@@ -11,12 +17,6 @@ use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;
 use shared_model::tire::TireModel;
 use shared_model::vehicle::SlipForm;
-use sim_host::chaos::sweep::{Timing, Watch};
-use sim_host::engine::reference::Reference;
-use sim_host::engine::taylor::{Found, Motions, ORDER, Span, Watched};
-use sim_host::map::cell::{Cell, cells};
-use sim_host::map::plan::{Grid, Plan, Sheet, Start};
-use sim_host::motion::Motion;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -102,23 +102,27 @@ impl Job {
     }
 
     /// Follows the motions; gives the ends, steps, changes of mode and the mean exponent.
-    fn follow(self, motions: &Motions, time_s: f64, tolerance: f64) -> Outcome {
+    fn follow(self, motions: &Ensemble, time_s: f64, tolerance: f64) -> Outcome {
         let span = Span {
             time_s,
             tolerance,
-            watched: Watched::default(),
+            observables: Observables::default(),
             warm_up_s: 0.0,
-            pieces: 0,
+            segments: 0,
         };
         match self {
             Self::Exponents => {
-                let pieces = (time_s / COMPARED_S) as usize;
-                let found = motions.follow::<1>(&Span { pieces, ..span });
-                let growth: f64 = found.iter().flat_map(|f| &f.growths).map(|g| g[0]).sum();
+                let segments = (time_s / COMPARED_S) as usize;
+                let found = motions.integrate::<1>(&Span { segments, ..span });
+                let growth: f64 = found
+                    .iter()
+                    .flat_map(|f| &f.log_stretching)
+                    .map(|g| g[0])
+                    .sum();
                 let mean = growth / time_s / found.len() as f64;
                 Outcome::of(&found, Some(mean))
             }
-            _ => Outcome::of(&motions.follow::<0>(&span), None),
+            _ => Outcome::of(&motions.integrate::<0>(&span), None),
         }
     }
 }
@@ -132,7 +136,7 @@ struct Outcome {
 }
 
 impl Outcome {
-    fn of<const K: usize>(found: &[Found<K>], mean_exponent_per_s: Option<f64>) -> Self {
+    fn of<const K: usize>(found: &[Trajectory<K>], mean_exponent_per_s: Option<f64>) -> Self {
         Self {
             ends: found.iter().map(|f| f.end.x.into()).collect(),
             steps: found.iter().map(|f| f.steps).sum(),
@@ -236,7 +240,7 @@ fn fixed_step(job: Job) {
     let scenarios = job.scenarios();
     let follow = |time_s: f64| -> Vec<[f64; 4]> {
         let end = |scenario: &Scenario<f64>| {
-            let mut motion = Motion::new(scenario).expect("it is valid");
+            let mut motion = Stepper::new(scenario).expect("it is valid");
             motion.observe(time_s, |_, _| {}).expect("it stays bounded");
             motion.state().x.into()
         };
@@ -253,7 +257,7 @@ fn fixed_step(job: Job) {
 }
 
 fn measure(job: Job, runs: usize) -> Measured {
-    let motions = Motions::new(&job.scenarios()).expect("the jobs fit");
+    let motions = Ensemble::new(&job.scenarios()).expect("the jobs fit");
     let reference = reference(job);
     let error_at = |tolerance: f64| {
         worst(
@@ -381,7 +385,7 @@ fn map(cells_a_side: usize) {
         pool(threads).install(|| {
             let start = Instant::now();
             let tile = |&tile: &usize| cells(&plan, &plan.places(tile)).expect("the cells fit");
-            let cells = Watch::NOBODY.points(&tiles, tile);
+            let cells = RunControl::none().points(&tiles, tile);
             let cells: Vec<Cell> = cells.into_iter().flatten().flatten().collect();
             (start.elapsed().as_secs_f64(), cells)
         })

@@ -3,16 +3,16 @@
 mod common;
 
 use common::{assert_ends, command, folder};
+use dynamics::attractor::{Kind, attractor};
+use dynamics::map::cell::{self, Cell, cells};
+use dynamics::map::plan::{Grid, Place, Plan, Sheet, Start};
+use dynamics::map::table::PLAN_KEY;
+use dynamics::map::tiles::resealed;
+use dynamics::sweep::Timing;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use sim_host::chaos::attractor::{Kind, attractor};
-use sim_host::chaos::sweep::Timing;
-use sim_host::map::cell::{self, Cell, cells};
-use sim_host::map::plan::{Grid, Place, Plan, Sheet, Start};
-use sim_host::map::table::PLAN_KEY;
-use sim_host::map::tiles::resealed;
 use std::fs;
 use std::path::Path;
 

@@ -3,12 +3,12 @@
 mod common;
 
 use common::{assert_ends, command, folder};
+use pil::drive::{Drive, ecu_scenario};
+use pil::ecu::Software;
+use pil::manoeuvre::Manoeuvre;
+use pil::recording::Recording;
+use pil::run::run;
 use shared_model::Scenario;
-use sim_host::closed_loop::drive::{Drive, ecu_scenario};
-use sim_host::closed_loop::ecu::Software;
-use sim_host::closed_loop::manoeuvre::Manoeuvre;
-use sim_host::closed_loop::recording::Recording;
-use sim_host::closed_loop::run::run;
 use std::path::Path;
 
 fn assert_refused(folder: &Path, line: &str, parts: &[&str]) {

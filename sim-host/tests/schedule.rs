@@ -3,13 +3,13 @@
 mod common;
 
 use common::{assert_ends, assert_refused, command, folder};
+use dynamics::schedule::choose::Choice;
+use dynamics::schedule::{Analysis, Plan, schedule};
+use dynamics::sweep::{RunControl, Timing, Values};
 use shared_model::dither::Waveform;
 use shared_model::schedule::Schedule;
 use shared_model::schedule_table::{POINTS, SINE, SQUARE};
 use shared_model::{Real, Scenario};
-use sim_host::chaos::sweep::{Timing, Values, Watch};
-use sim_host::schedule::choose::Choice;
-use sim_host::schedule::{Analysis, Plan, schedule};
 use std::fs;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -29,7 +29,7 @@ fn plan(from_rpm: f64, to_rpm: f64, greatest_v: f64) -> Plan {
 fn analysis(waveform: Waveform, plan: &Plan) -> Analysis {
     let mut scenario = Scenario::reconstruction();
     scenario.dither.waveform = waveform;
-    let watch = Watch {
+    let watch = RunControl {
         stop: &AtomicBool::new(false),
         done: &|| (),
     };

@@ -2,13 +2,13 @@
 
 pub mod golden;
 
+use image::Image;
+use qemu::log::LogDecoder;
+use qemu::settings;
+use qemu::telemetry::Recording;
+use qemu::{self, Finished, Machine, RunError};
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
-use sim_host::pil::elf::Image;
-use sim_host::pil::log::LogDecoder;
-use sim_host::pil::qemu::{self, Finished, Machine, RunError};
-use sim_host::pil::settings;
-use sim_host::pil::telemetry::Recording;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 

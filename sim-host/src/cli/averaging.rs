@@ -3,10 +3,10 @@
 use super::output::Destinations;
 use super::{Done, RunOptions};
 use anyhow::ensure;
+use dynamics::averaging::{Comparison, compare};
+use dynamics::words::Short;
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::dither::Waveform;
-use sim_host::averaging::{Comparison, compare};
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use sim_host::words::Short;
 
 /// The true dither signal against the averaged system, over the dither's frequency: where averaging starts to hold.
 ///

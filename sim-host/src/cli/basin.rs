@@ -3,12 +3,12 @@
 use super::output::Destinations;
 use super::sweep::{TransientOptions, check_interrupted, large_dots, side_by_side, with_progress};
 use super::{Done, RunOptions};
+use dynamics::attractor::{Attractor, Kind};
+use dynamics::basin::{Basin, Cell, basin};
+use dynamics::sweep::{Timing, Values};
+use dynamics::words::counted;
+use plot::chart::{AxisSpec, Chart, Panel};
 use serde::Serialize;
-use sim_host::chaos::attractor::{Attractor, Kind};
-use sim_host::chaos::basin::{Basin, Cell, basin};
-use sim_host::chaos::sweep::{Timing, Values};
-use sim_host::report::chart::{AxisSpec, Chart, Panel};
-use sim_host::words::counted;
 
 /// Basins of attraction: which start ends on which attractor, over a grid of sideslip and steering angles.
 ///

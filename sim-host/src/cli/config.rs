@@ -1,7 +1,7 @@
 //! `sim-host config`: the complete configuration.
 
 use super::{ConfigOptions, Done};
-use sim_host::config::{to_toml, validate};
+use dynamics::config::{to_toml, validate};
 
 /// Print a complete configuration as TOML, checked. Names carry their units.
 #[derive(clap::Args)]

@@ -3,9 +3,9 @@
 use super::output::Destinations;
 use super::{Done, RunOptions};
 use anyhow::ensure;
-use sim_host::convergence::{Error, errors};
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use sim_host::words::Short;
+use dynamics::convergence::{Error, errors};
+use dynamics::words::Short;
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 
 /// Error of the ECU's fixed step against the reference integrator, over the length of the step.
 ///

@@ -2,9 +2,10 @@
 
 use super::output::{check, named};
 use super::{Done, simulate};
-use sim_host::pil::qemu::meaning;
-use sim_host::pil::telemetry::Recording;
-use sim_host::words::counted;
+use dynamics::words::counted;
+use pil::equivalence::trace_of;
+use qemu::meaning;
+use qemu::telemetry::Recording;
 use std::path::PathBuf;
 
 /// Check a telemetry file of the firmware, say how its run ended, and write its motion as CSV.
@@ -42,7 +43,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         trailer.neutral_duty,
     );
     if let Some(out) = &arguments.out {
-        simulate::write(&recording.trace(), out, arguments.force)?;
+        simulate::write(&trace_of(&recording), out, arguments.force)?;
     }
     Ok(Done::Well)
 }

@@ -4,12 +4,12 @@ use super::output::Destinations;
 use super::sweep::{SpeedRange, check_interrupted, large_dots, with_progress};
 use super::{Done, RunOptions};
 use anyhow::{bail, ensure};
+use dynamics::eigenvalues::Eigenvalue;
+use dynamics::equilibria::{Equilibrium, Hopf, hopf, over_speed};
+use dynamics::words::{counted, counted_as};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::vehicle::STEERING_ANGLE;
-use sim_host::chaos::eigenvalues::Eigenvalue;
-use sim_host::chaos::equilibria::{Equilibrium, Hopf, hopf, over_speed};
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use sim_host::words::{counted, counted_as};
 
 /// All equilibria at a wheel speed or over a range of speeds, with eigenvalues and stability, and the speeds of Hopf
 /// bifurcations.
@@ -265,9 +265,9 @@ fn speed_chart(speeds: &[Speed], hopf: &[Hopf]) -> Chart {
     )];
     if !hopf.is_empty() {
         let caption = "growth of the pair of eigenvalues that changes stability";
-        let mut growths = panel(caption, "real part (1/s)", &bifurcating, growth);
-        growths.levels = vec![0.0];
-        panels.push(growths);
+        let mut log_stretching = panel(caption, "real part (1/s)", &bifurcating, growth);
+        log_stretching.levels = vec![0.0];
+        panels.push(log_stretching);
     }
     Chart {
         heading: "Equilibria over wheel speed".into(),

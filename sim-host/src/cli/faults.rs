@@ -1,18 +1,17 @@
 //! `sim-host faults`: faults on purpose, and whether any of them stays unfound.
 
+use super::emulator::open_image;
 use super::output::{Destinations, named};
 use super::{Done, time_out};
-use anyhow::Context;
 use clap::Args;
+use dynamics::words::counted;
 use indicatif::{ProgressBar, ProgressStyle};
+use pil::fault::campaign::{self, Clean, Row, Total, totals};
+use pil::fault::catalogue::{self, Class};
+use pil::fault::figure::draw;
+use pil::fault::manoeuvres;
 use rayon::prelude::*;
 use serde::Serialize;
-use sim_host::closed_loop::fault::campaign::{self, Clean, Row, Total, totals};
-use sim_host::closed_loop::fault::catalogue::{self, Class};
-use sim_host::closed_loop::fault::manoeuvres;
-use sim_host::pil::elf::Image;
-use sim_host::report::fault_matrix;
-use sim_host::words::counted;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
@@ -62,7 +61,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments.destinations.check(firmware)?;
     let limit = time_out(arguments.time_out)?;
     // Before the minutes of work on the host.
-    let image = arguments.firmware.as_deref().map(Image::open).transpose()?;
+    let image = arguments.firmware.as_deref().map(open_image).transpose()?;
     let mut rows = on_host(arguments.quick)?;
     match image {
         Some(image) => rows.extend(processor::inject(image, arguments.quick, limit)?),
@@ -75,7 +74,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         totals: totals.collect(),
         rows: &rows,
     };
-    let figure = || fault_matrix(&rows).context("cannot draw the figure");
+    let figure = || draw(&rows);
     arguments.destinations.write(&rows, &results, figure)?;
     let is_unlisted = rows.iter().any(Row::is_unlisted);
     Ok(if is_unlisted {
@@ -101,15 +100,15 @@ fn on_host(quick: bool) -> anyhow::Result<Vec<Row>> {
 
 mod processor {
     use super::{FLIPS, QUICK_FLIPS, progress};
+    use image::Image;
+    use interrupt;
+    use pil::fault::campaign::Row;
+    use pil::fault::memory::flips;
+    use pil::fault::processor::{Action, BENCH_TICKS, Bench};
+    use pil::levels::Target;
+    use qemu::session::LinkKind;
+    use qemu::{Machine, RunError};
     use rayon::prelude::*;
-    use sim_host::closed_loop::fault::campaign::Row;
-    use sim_host::closed_loop::fault::memory::flips;
-    use sim_host::closed_loop::fault::processor::{Action, BENCH_TICKS, Bench};
-    use sim_host::closed_loop::levels::Target;
-    use sim_host::interrupt;
-    use sim_host::pil::elf::Image;
-    use sim_host::pil::qemu::{Machine, RunError};
-    use sim_host::pil::session::LinkKind;
     use std::time::Duration;
 
     /// Faults of memory and core, each in an emulator of its own.

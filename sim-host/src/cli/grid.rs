@@ -1,8 +1,8 @@
 //! What the subcommands share that look at the plane of wheel speed and dither amplitude: its axes, and the times of each run.
 
 use clap::Args;
+use dynamics::sweep::{SweepError, Timing};
 use shared_model::dither::Waveform;
-use sim_host::chaos::sweep::{SweepError, Timing};
 
 /// The plane's axes; amplitudes begin at 0 unless they are given another beginning.
 #[derive(Args)]

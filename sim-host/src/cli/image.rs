@@ -1,12 +1,14 @@
 //! `sim-host image`: what a firmware image needs of its board, and how deep its stack can get.
 
 use super::Done;
+use super::emulator::open_image;
 use super::output::{check, named};
+use dynamics::words::counted;
+use files::output::write_json;
+use image::Image;
+use image::stack::{Level, Stack};
 use serde::Serialize;
-use sim_host::image::stack::{Level, Stack};
-use sim_host::output::write_json;
-use sim_host::pil::elf::Image;
-use sim_host::words::counted;
+use sim_host::firmware::PRIORITIES;
 use std::path::PathBuf;
 
 /// Show an image's size and its worst stack with the calls that lead there, read from the machine code.
@@ -42,8 +44,8 @@ struct Results<'a> {
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let input = ("the image", arguments.image.as_path());
     check([input], [named("--json", &arguments.json)], arguments.force)?;
-    let image = Image::open(&arguments.image)?;
-    let stack = Stack::analyse(&image.bytes)?;
+    let image = open_image(&arguments.image)?;
+    let stack = Stack::analyse(&image.bytes, &PRIORITIES)?;
     show(&image, &stack);
     if let Some(path) = &arguments.json {
         let results = Results {

@@ -5,16 +5,15 @@ use super::sweep::SpeedRange;
 use super::{COULD_NOT_RUN, Done, RunOptions};
 use anyhow::ensure;
 use clap::ValueEnum;
+use dynamics::flow::{Flow, VehicleFlow};
+use dynamics::method::{Estimate, Method, estimates};
+use dynamics::sweep::{Parameter, RunControl, Timing, scenarios};
+use dynamics::synchronisation::Search;
+use dynamics::words::{Short, counted};
 use indicatif::{ProgressBar, ProgressStyle};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
-use sim_host::chaos::flow::{Flow, VehicleFlow};
-use sim_host::chaos::method::{Estimate, Method, estimates};
-use sim_host::chaos::sweep::{Parameter, Timing, Watch, scenarios};
-use sim_host::chaos::synchronisation::Search;
-use sim_host::interrupt;
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use sim_host::words::{Short, counted};
 use std::time::{Duration, Instant};
 
 /// Lyapunov exponents of the motion, at one speed or over a range of speeds, by three independent methods.
@@ -208,7 +207,7 @@ fn measure(
             .progress_chars("=> "),
     );
     bar.enable_steady_tick(Duration::from_millis(200));
-    let watch = Watch {
+    let watch = RunControl {
         stop: &interrupt::REQUESTED,
         done: &|| bar.inc(1),
     };

@@ -5,18 +5,17 @@ use super::output::{Named, check, named};
 use super::{ConfigOptions, Done};
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand, ValueEnum};
+use dynamics::config::validate;
+use dynamics::map::cell::{Cell, Kind};
+use dynamics::map::figure::draw;
+use dynamics::map::plan::{CELLS_A_TILE, Grid, Plan, Sheet, Start};
+use dynamics::map::table;
+use dynamics::map::tiles::{Folder, Shard, plan_of, put_together};
+use dynamics::sweep::{RunControl, SweepError, Values};
+use dynamics::words::counted;
+use files::output::{self, Outputs, write_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::dither::Waveform;
-use sim_host::chaos::sweep::{SweepError, Values, Watch};
-use sim_host::config::validate;
-use sim_host::interrupt;
-use sim_host::map::cell::{Cell, Kind};
-use sim_host::map::plan::{CELLS_A_TILE, Grid, Plan, Sheet, Start};
-use sim_host::map::table;
-use sim_host::map::tiles::{Folder, Shard, plan_of, put_together};
-use sim_host::output::{self, Outputs, write_rows, write_text};
-use sim_host::report::motion_map;
-use sim_host::words::counted;
 use std::path::PathBuf;
 
 /// The motion over wheel speed N and dither amplitude W: largest Lyapunov exponent, period, extent and kind in each cell.
@@ -177,13 +176,13 @@ fn fill(folder: &Folder, shard: Shard) -> anyhow::Result<()> {
         .progress_chars("=> ");
     let cells = folder.missing(shard).len() * CELLS_A_TILE;
     let bar = ProgressBar::new(cells as u64).with_style(style);
-    let watch = Watch {
+    let watch = RunControl {
         stop: &interrupt::REQUESTED,
         done: &|| bar.inc(CELLS_A_TILE as u64),
     };
     let filled = folder.fill(shard, watch);
     bar.finish_and_clear();
-    filled
+    Ok(filled?)
 }
 
 impl Arguments {
@@ -303,10 +302,10 @@ impl Files {
             write_rows(path, cells, self.force)?;
         }
         if let Some(path) = &self.parquet {
-            output::write(path, self.force, |to| table::write(plan, cells, to))?;
+            output::write(path, self.force, |to| Ok(table::write(plan, cells, to)?))?;
         }
         if let Some(path) = &self.figure {
-            write_text(path, &motion_map(plan, cells)?, self.force)?;
+            write_text(path, &draw(plan, cells), self.force)?;
         }
         Ok(())
     }

@@ -4,10 +4,10 @@ use super::output::Destinations;
 use super::tires::greatest_angle;
 use super::{ConfigOptions, Done, waveform};
 use anyhow::ensure;
+use dynamics::characteristics::{NonlinearityRow, nonlinearities, nonlinearities_chart};
+use dynamics::config::validate;
 use serde::Serialize;
 use shared_model::dither::Waveform;
-use sim_host::characteristics::{NonlinearityRow, nonlinearities, nonlinearities_chart};
-use sim_host::config::validate;
 
 /// Effective against original nonlinearity (Figures 9 to 11 and 14 to 16): front tyre, rear tyre, and the friction's sign as
 /// printed.

@@ -6,19 +6,19 @@ use super::sweep::{
 };
 use super::{Done, RunOptions};
 use clap::ValueEnum;
+use dynamics::component::Component;
+use dynamics::orbit::{Outcome, Point, Section, Start, diagram};
+use dynamics::sweep::{Parameter, Timing};
+use dynamics::words::counted;
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
-use sim_host::chaos::orbit::{Outcome, Point, Section, Start, diagram};
-use sim_host::chaos::sweep::{Parameter, Timing};
-use sim_host::component::Component;
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use sim_host::words::counted;
 
 /// Orbit diagram (bifurcation diagram): maxima of the yaw rate, or crossings of a section, over wheel speed or dither
 /// amplitude.
 ///
 /// Each run starts as the scenario does, or where its neighbour ended (`--start up` or `down`), so hysteresis shows. The
-/// dither is averaged and on from the start. Motions that diverge are named as such and have no values.
+/// dither is averaged and on from the start. Ensemble that diverge are named as such and have no values.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host orbit --from 1600 --to 1900 --step 1 \\

@@ -2,8 +2,8 @@
 
 use super::stdout;
 use clap::Args;
+use files::output::{Outputs, write_json, write_rows, write_text};
 use serde::Serialize;
-use sim_host::output::{Outputs, write_json, write_rows, write_text};
 use std::path::{Path, PathBuf};
 
 /// A file or folder, and the option that names it.
@@ -70,7 +70,7 @@ impl Destinations {
         &self,
         rows: impl IntoIterator<Item = impl Serialize>,
         results: &impl Serialize,
-        draw: impl FnOnce() -> anyhow::Result<String>,
+        draw: impl FnOnce() -> String,
     ) -> anyhow::Result<()> {
         if let Some(path) = &self.out {
             write_rows(path, rows, self.force)?;
@@ -79,7 +79,7 @@ impl Destinations {
             write_json(path, results, self.force)?;
         }
         if let Some(path) = &self.figure {
-            write_text(path, &draw()?, self.force)?;
+            write_text(path, &draw(), self.force)?;
         }
         Ok(())
     }

@@ -3,9 +3,9 @@
 use super::Done;
 use super::output::Destinations;
 use super::settled::{SettledRun, title};
+use dynamics::component::{Component, panel_of_states};
+use plot::chart::{Chart, Look};
 use serde::Serialize;
-use sim_host::component::Component;
-use sim_host::report::chart::{Chart, Look, Panel};
 
 /// Phase portrait of the settled motion: one component of the state against another.
 #[derive(clap::Args)]
@@ -84,7 +84,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         let states = trace.states.iter().map(|state| state.x);
         Chart {
             heading: format!("Phase portrait \u{2013} {}", title(&scenario)),
-            panels: vec![Panel::of_states((x, y), states, Look::Line(0))],
+            panels: vec![panel_of_states((x, y), states, Look::Line(0))],
         }
         .svg()
     })?;

@@ -1,25 +1,25 @@
 //! `sim-host pil`: manoeuvres with the ECU in the loop.
 
+use super::emulator::{link_kinds, machines, open_image};
 use super::output::{Destinations, check, named};
 use super::{Done, time_out, waveform};
 use anyhow::{Context, ensure};
+use dynamics::config::validate;
+use dynamics::words::{counted, counted_as};
+use files::input;
+use files::output::{self, write_json, write_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
+use pil::drive::ecu_scenario;
+use pil::figure::draw;
+use pil::levels::{Levels, Target, drive};
+use pil::manoeuvre::{self, Manoeuvre};
+use pil::profile::Profile;
+use pil::recording::{MAGIC, Recording};
+use pil::run::{Comparison, Depth, compare};
+use qemu::Machine;
+use qemu::session::LinkKind;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use sim_host::bounded;
-use sim_host::closed_loop::drive::ecu_scenario;
-use sim_host::closed_loop::levels::{Levels, Target, drive};
-use sim_host::closed_loop::manoeuvre::{self, Manoeuvre};
-use sim_host::closed_loop::profile::Profile;
-use sim_host::closed_loop::recording::{MAGIC, Recording};
-use sim_host::closed_loop::run::{Comparison, Depth, compare};
-use sim_host::config::validate;
-use sim_host::output::{self, write_json, write_rows, write_text};
-use sim_host::pil::elf::Image;
-use sim_host::pil::qemu::Machine;
-use sim_host::pil::session::LinkKind;
-use sim_host::report;
-use sim_host::words::{counted, counted_as};
 use std::path::{Path, PathBuf};
 
 /// Drive manoeuvres with the ECU in the loop: as a model, as software on this host, and as firmware in QEMU; compare the three
@@ -55,10 +55,10 @@ pub struct Arguments {
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time: Option<f64>,
     /// What carries the exchange with the firmware
-    #[arg(long, value_enum, default_value = "files")]
+    #[arg(long, value_parser = link_kinds(), default_value = "files")]
     link: LinkKind,
     /// Machine to emulate
-    #[arg(long, value_enum, default_value = "mps2-an386")]
+    #[arg(long, value_parser = machines(), default_value = "mps2-an386")]
     machine: Machine,
     /// Firmware image (ELF)
     #[arg(
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let manoeuvres = arguments.manoeuvres()?;
     arguments.check_outputs(manoeuvres.len())?;
     let target = Target {
-        image: Image::open(&arguments.firmware)?,
+        image: open_image(&arguments.firmware)?,
         machine: arguments.machine,
         link: arguments.link,
         time_out,
@@ -190,7 +190,7 @@ impl Arguments {
             write_rows(path, &run.records, self.files.force)?;
         }
         if let Some(path) = &self.files.figure {
-            write_text(path, &report::drive(&levels.name, run)?, self.files.force)?;
+            write_text(path, &draw(&levels.name, run), self.files.force)?;
         }
         Ok(())
     }
@@ -314,7 +314,7 @@ fn words(comparison: &Comparison) -> String {
 fn replay(file: &Path) -> anyhow::Result<Done> {
     let name = file.display();
     let is_start = |start: &[u8]| start.starts_with(MAGIC);
-    let bytes = bounded::read(file, bounded::RECORDING_BYTES, is_start)
+    let bytes = input::read(file, input::RECORDING_BYTES, is_start)
         .with_context(|| format!("cannot read {name}"))?;
     let recording = Recording::read(&bytes).with_context(|| name.to_string())?;
     let replayed = recording.replay().with_context(|| name.to_string())?;

@@ -5,11 +5,11 @@ use super::output::Destinations;
 use super::settled::{SettledRun, title};
 use anyhow::{Context, ensure};
 use clap::ValueEnum;
+use dynamics::component::{Component, panel_of_states};
+use dynamics::poincare::{Crossing, Direction, Section, crossings, range};
+use dynamics::words::counted;
+use plot::chart::{Chart, Look, Panel};
 use serde::Serialize;
-use sim_host::chaos::poincare::{Crossing, Direction, Section, crossings, range};
-use sim_host::component::Component;
-use sim_host::report::chart::{Chart, Look, Panel};
-use sim_host::words::counted;
 
 /// Poincaré section of the settled motion: its states where one component passes a value.
 #[derive(clap::Args)]
@@ -164,7 +164,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
                 heading: format!("Poincar\u{e9} section \u{2013} {}", title(&scenario)),
                 panels: vec![Panel {
                     caption: format!("{} of {section:.4}", counted(found.len(), "crossing")),
-                    ..Panel::of_states((x, y), states, Look::Dots)
+                    ..panel_of_states((x, y), states, Look::Dots)
                 }],
             }
             .svg()

@@ -1,15 +1,15 @@
 //! `sim-host qemu`: the cargo runner of the firmware.
 
 use super::Done;
+use super::emulator::{machines, open_image};
 use super::output::check;
 use anyhow::{Context, anyhow, ensure};
+use dynamics::config;
+use qemu::Machine;
+use qemu::log::LogDecoder;
+use qemu::telemetry::Recording;
 use shared_model::Scenario;
 use shared_model::settings::SettingError;
-use sim_host::config;
-use sim_host::pil::elf::Image;
-use sim_host::pil::log::LogDecoder;
-use sim_host::pil::qemu::{self, Machine};
-use sim_host::pil::telemetry::Recording;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 use toml::{Table, Value};
@@ -31,7 +31,7 @@ watchdog, 16 unexpected interrupt; 2 if it could not be run or did not end in ti
 )]
 pub struct Arguments {
     /// Machine to emulate
-    #[arg(long, value_enum, default_value = "mps2-an386")]
+    #[arg(long, value_parser = machines(), default_value = "mps2-an386")]
     machine: Machine,
     /// Longest time that the run may take, s
     #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
@@ -53,7 +53,7 @@ const TELEMETRY: &str = "telemetry=";
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let time_out = super::time_out(arguments.time_out)?;
     check_settings(&arguments.settings)?;
-    let image = Image::open(&arguments.image)?;
+    let image = open_image(&arguments.image)?;
     let decoder = LogDecoder::new(&image)?;
     if !decoder.is_readable() {
         eprintln!(

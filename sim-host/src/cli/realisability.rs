@@ -3,11 +3,11 @@
 use super::output::Destinations;
 use super::{ConfigOptions, Done};
 use anyhow::ensure;
+use dynamics::config::validate;
+use dynamics::realisability::{Amplitudes, Demand, Response, bode_chart, demands, responses};
+use dynamics::words::Short;
 use serde::Serialize;
 use shared_model::dither::Waveform;
-use sim_host::config::validate;
-use sim_host::realisability::{Amplitudes, Demand, Response, bode_chart, demands, responses};
-use sim_host::words::Short;
 
 /// What the steering actuator passes of the dither (Bode diagram), the torque that the dither's amplitude would need, and the
 /// amplitude that the motor reaches, from 1 to 20,000 rad/s.

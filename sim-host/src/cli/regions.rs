@@ -6,12 +6,12 @@ use super::sweep::{
 };
 use super::{Done, RunOptions};
 use anyhow::ensure;
+use dynamics::regions::{Regions, Sample, coexisting, regions};
+use dynamics::sweep::{Parameter, Timing, mirrored};
+use dynamics::words::{Short, counted};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
-use sim_host::chaos::regions::{Regions, Sample, coexisting, regions};
-use sim_host::chaos::sweep::{Parameter, Timing, mirrored};
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use sim_host::words::{Short, counted};
 
 /// Kinds of motion (equilibrium, period-n, chaos) over wheel speed or dither amplitude, with each edge between them bisected.
 ///

@@ -2,11 +2,10 @@
 
 use super::Done;
 use super::output::{check, named};
+use dynamics::config::validate;
 use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::settings::Choice;
 use shared_model::{Preset, Scenario};
-use sim_host::config::validate;
-use sim_host::interrupt;
 use sim_host::reproduce::{CLAIMS, Judgement, Options, Progress, Quality, Summary, reproduce};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};

@@ -5,19 +5,19 @@ use super::output::{check, named};
 use super::sweep::with_progress;
 use super::{ConfigOptions, Done};
 use anyhow::{Context, anyhow, bail, ensure};
+use dynamics::config::{differences, validate};
+use dynamics::map::cell::Cell as MapCell;
+use dynamics::map::plan::Plan as MapPlan;
+use dynamics::schedule::cells::Cell;
+use dynamics::schedule::choose::Choice;
+use dynamics::schedule::figure::draw;
+use dynamics::schedule::{Analysis, Plan, from_map, runs, schedule, source};
+use dynamics::sweep::{Timing, Values};
+use dynamics::words::{Short, counted};
+use files::output::{write_json, write_rows, write_text};
 use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use sim_host::chaos::sweep::{Timing, Values};
-use sim_host::config::{differences, validate};
-use sim_host::map::cell::Cell as MapCell;
-use sim_host::map::plan::Plan as MapPlan;
-use sim_host::output::{write_json, write_rows, write_text};
-use sim_host::report::schedule_map;
-use sim_host::schedule::choose::Choice;
-use sim_host::schedule::map::Cell;
-use sim_host::schedule::{Analysis, Plan, from_map, runs, schedule, table};
-use sim_host::words::{Short, counted};
 use std::path::{Path, PathBuf};
 
 /// The dither amplitude W that each wheel speed N needs, for square wave and sine: the table that the ECU carries.
@@ -216,7 +216,7 @@ impl Arguments {
     }
 
     fn read_map(&self, path: &Path, fitting: &MapPlan) -> anyhow::Result<(MapPlan, Vec<MapCell>)> {
-        let (map, cells) = sim_host::map::table::open(path)?;
+        let (map, cells) = dynamics::map::table::open(path)?;
         let misfits = from_map::misfits(&map, fitting);
         ensure!(misfits.is_empty(), "{}", misfits.join("; "));
         Ok((map, cells))
@@ -273,7 +273,7 @@ impl Arguments {
 
     fn write(&self, scenario: &Scenario<f64>, analyses: &[Analysis]) -> anyhow::Result<()> {
         if let Some(path) = &self.out {
-            let source = table::source(analyses, &self.made_by(scenario));
+            let source = source::source(analyses, &self.made_by(scenario));
             write_text(path, &source, self.force)?;
         }
         if let Some(path) = &self.csv {
@@ -288,7 +288,7 @@ impl Arguments {
             write_json(path, &results, self.force)?;
         }
         if let Some(path) = &self.figure {
-            write_text(path, &schedule_map(analyses)?, self.force)?;
+            write_text(path, &draw(analyses), self.force)?;
         }
         Ok(())
     }
@@ -333,7 +333,7 @@ fn show(analysis: &Analysis) {
         1e3 * analysis.edge_width_v
     );
     for entry in &analysis.entries {
-        say!("  {:.4} V  {}", entry.amplitude_v, table::remark(entry));
+        say!("  {:.4} V  {}", entry.amplitude_v, source::remark(entry));
     }
     let count = |choice| {
         analysis

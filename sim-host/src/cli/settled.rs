@@ -5,10 +5,10 @@ use super::advice;
 use super::output::Named;
 use anyhow::{bail, ensure};
 use clap::Args;
+use dynamics::simulate::{after_transient, early_end, record};
+use dynamics::trace::Trace;
+use dynamics::words::Short;
 use shared_model::Scenario;
-use sim_host::simulate::{after_transient, early_end, record};
-use sim_host::trace::Trace;
-use sim_host::words::Short;
 
 /// Least and greatest transient, s.
 const TRANSIENTS_S: std::ops::RangeInclusive<f64> = 0.0..=100_000.0;
@@ -68,8 +68,8 @@ impl SettledRun {
 
 /// What a run is, for headings: speed and dither.
 pub fn title(scenario: &Scenario<f64>) -> String {
+    use plot::number::four_digits;
     use shared_model::dither::{Application, Waveform};
-    use sim_host::verdict::figure;
     let dither = &scenario.dither;
     let waveform = match dither.waveform {
         Waveform::None => return format!("{} rpm, no dither", scenario.run.wheel_speed_rpm),
@@ -83,6 +83,6 @@ pub fn title(scenario: &Scenario<f64>) -> String {
     format!(
         "{} rpm, {waveform} dither {} V {application}",
         scenario.run.wheel_speed_rpm,
-        figure(dither.amplitude_v)
+        four_digits(dither.amplitude_v)
     )
 }

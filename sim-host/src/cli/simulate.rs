@@ -3,10 +3,10 @@
 use super::output::check;
 use super::{Done, RunOptions, advice};
 use anyhow::bail;
-use sim_host::output;
-use sim_host::simulate::{early_end, simulate};
-use sim_host::trace::Trace;
-use sim_host::words::counted;
+use dynamics::simulate::{early_end, simulate};
+use dynamics::trace::Trace;
+use dynamics::words::counted;
+use files::output;
 use std::path::PathBuf;
 
 /// Run a scenario on the host and write its motion as CSV.
@@ -55,7 +55,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
 
 /// Writes a trace as CSV, one row a model step; the duty code is that of the step's last PWM period.
 pub fn write(trace: &Trace, path: &std::path::Path, force: bool) -> anyhow::Result<()> {
-    output::write(path, force, |to| {
+    Ok(output::write(path, force, |to| {
         let mut csv = csv::Writer::from_writer(to);
         csv.write_record([
             "time_s",
@@ -75,5 +75,5 @@ pub fn write(trace: &Trace, path: &std::path::Path, force: bool) -> anyhow::Resu
             csv.write_record(row)?;
         }
         Ok(csv.flush()?)
-    })
+    })?)
 }

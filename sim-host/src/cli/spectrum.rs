@@ -4,13 +4,13 @@ use super::Done;
 use super::output::Destinations;
 use super::settled::{SettledRun, title};
 use anyhow::{Context, ensure};
+use dynamics::component::Component;
+use dynamics::power_spectrum::{MIN_SEGMENT, PowerSpectrum, welch};
+use dynamics::words::{Short, counted};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
-use sim_host::chaos::power_spectrum::{MIN_SEGMENT, PowerSpectrum, welch};
-use sim_host::component::Component;
-use sim_host::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use sim_host::words::{Short, counted};
 use std::f64::consts::TAU;
 
 /// Segments of half overlap that a run has by default.

@@ -3,16 +3,15 @@
 use super::RunOptions;
 use anyhow::{bail, ensure};
 use clap::{Args, ValueEnum};
+use dynamics::observe::observe;
+use dynamics::sweep::{LARGEST_BATCH, Parameter, RunControl, SweepError, Timing, Values};
+use dynamics::words::counted;
+use engine::taylor::Observables;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
+use plot::chart::{Look, Region, Series};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use sim_host::chaos::observe::observe;
-use sim_host::chaos::sweep::{LARGEST_BATCH, Parameter, SweepError, Timing, Values, Watch};
-use sim_host::engine::taylor::Watched;
-use sim_host::interrupt;
 use sim_host::paper::REGION_EDGES_RPM;
-use sim_host::report::chart::{Look, Region, Series};
-use sim_host::words::counted;
 use std::time::Instant;
 
 /// More runs than this have their cost said first.
@@ -150,7 +149,13 @@ impl TransientOptions {
         let trial = vec![*scenario; at_once];
         let start = Instant::now();
         let timed = Timing::new(0.0, TIMED_S)?;
-        observe::<0, ()>(&trial, timed, Watched::default(), Watch::NOBODY, |_, _| ())?;
+        observe::<0, ()>(
+            &trial,
+            timed,
+            Observables::default(),
+            RunControl::none(),
+            |_, _| (),
+        )?;
         let rounds = runs.div_ceil(at_once) as f64 * timing.time_s() / TIMED_S;
         let cost = HumanDuration(start.elapsed().mul_f64(rounds));
         let cost = format!(
@@ -172,13 +177,13 @@ pub fn side_by_side() -> usize {
 }
 
 /// Does the work with progress on a terminal, `runs` being expected.
-pub fn with_progress<R>(runs: usize, work: impl FnOnce(Watch) -> R) -> R {
+pub fn with_progress<R>(runs: usize, work: impl FnOnce(RunControl) -> R) -> R {
     let style =
         ProgressStyle::with_template("{elapsed_precise} [{bar:40}] {pos}/{len} runs, {eta} left")
             .expect("the template is valid")
             .progress_chars("=> ");
     let bar = ProgressBar::new(runs as u64).with_style(style);
-    let result = work(Watch {
+    let result = work(RunControl {
         stop: &interrupt::REQUESTED,
         done: &|| bar.inc(1),
     });

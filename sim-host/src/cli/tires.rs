@@ -3,10 +3,10 @@
 use super::output::Destinations;
 use super::{ConfigOptions, Done};
 use anyhow::ensure;
+use dynamics::characteristics::{TireRow, tires, tires_chart};
+use dynamics::config::validate;
+use dynamics::words::Short;
 use serde::Serialize;
-use sim_host::characteristics::{TireRow, tires, tires_chart};
-use sim_host::config::validate;
-use sim_host::words::Short;
 
 /// Cornering force against slip angle (Figure 2): both roads of Table 1, front and rear, Magic Formula and cubic tyre; and the
 /// configured road if it is another.

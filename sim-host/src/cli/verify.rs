@@ -1,15 +1,17 @@
 //! `sim-host verify`: the main job.
 
+use super::emulator::open_image;
 use super::output::check;
 use super::{ConfigOptions, Done, time_out};
 use anyhow::ensure;
+use dynamics::config::validate;
+use dynamics::words::Short;
+use files::output::make_folder;
+use image::Image;
 use indicatif::{ProgressBar, ProgressStyle};
-use sim_host::config::validate;
-use sim_host::output::make_folder;
-use sim_host::pil::elf::Image;
-use sim_host::report::{self, ReportInput, terminal};
+use plot::terminal;
+use sim_host::report::{self, ReportInput};
 use sim_host::verify::{Options, Progress, Verification, verify};
-use sim_host::words::Short;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -77,7 +79,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     validate(&base)?;
     let options = Options {
         time_out: time_out(arguments.time_out)?,
-        image: Image::open(&arguments.firmware)?,
+        image: open_image(&arguments.firmware)?,
         framed_image: Image::open(&arguments.stack_sizes).map_err(|error| error.to_string()),
         base,
         duration_s,

@@ -1,25 +1,17 @@
 //! The report: figures, one HTML page, and the verdict for programs.
 
-pub mod chart;
 mod figure;
-pub(crate) mod html;
-mod junit;
+mod html;
 #[cfg(test)]
 mod sample;
-pub mod terminal;
-mod text;
 
-pub use figure::drive::draw as drive;
-pub use figure::fault_matrix::draw as fault_matrix;
-pub use figure::motion_map::draw as motion_map;
-pub use figure::schedule_map::draw as schedule_map;
-
-use crate::closed_loop::run::Run;
-use crate::instructions::Instructions;
-use crate::output::{make_folder, write_text};
-use crate::trace::Trace;
-use crate::verdict::Verdict;
 use anyhow::ensure;
+use dynamics::trace::Trace;
+use files::output::{make_folder, write_text};
+use pil::instructions::Instructions;
+use pil::run::Run;
+use plot::junit;
+use plot::verdict::Verdict;
 use std::path::Path;
 
 /// What the report shows of one run on the ECU.
@@ -108,7 +100,7 @@ pub fn write(directory: &Path, input: &ReportInput) -> anyhow::Result<()> {
             input.runs.len()
         );
     }
-    let figures = figure::all(input)?;
+    let figures = figure::all(input);
     let figure_directory = directory.join(FIGURES);
     make_folder(&figure_directory)?;
     let replace = |path: &Path, text: &str| write_text(path, text, true);
@@ -117,8 +109,8 @@ pub fn write(directory: &Path, input: &ReportInput) -> anyhow::Result<()> {
         replace(&figure_directory.join(name), &figure.svg)?;
     }
     let verdict = serde_json::to_string_pretty(input.verdict)? + "\n";
-    let junit = junit::document(input.title, input.verdict)?;
-    let page = html::page(input, &figures).into_string();
+    let junit = junit::document(input.title, input.verdict);
+    let page = html::report(input, &figures).into_string();
     for (name, text) in FILES.iter().zip([verdict, junit, page]) {
         replace(&directory.join(name), &text)?;
     }

@@ -1,10 +1,10 @@
 //! Made-up runs of realistic shape, for tests.
 
 use super::{Pair, ReportInput, RunReport};
-use crate::instructions::Instructions;
-use crate::trace::Trace;
-use crate::verdict::{Check, Verdict};
+use dynamics::trace::Trace;
 use nalgebra::Vector4;
+use pil::instructions::Instructions;
+use plot::verdict::{Check, Verdict};
 use shared_model::friction::FrictionMode;
 use shared_model::vehicle::State;
 use std::f64::consts::TAU;

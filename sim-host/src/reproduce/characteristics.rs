@@ -3,9 +3,9 @@
 use super::figures::name_of;
 use super::piece::{Drawing, Material, Named, csv_of};
 use super::{Made, Quality};
-use crate::chaos::sweep::Watch;
-use crate::characteristics::{nonlinearities, nonlinearities_chart, tires, tires_chart};
-use crate::realisability::{Amplitudes, bode_chart, demands, responses};
+use dynamics::characteristics::{nonlinearities, nonlinearities_chart, tires, tires_chart};
+use dynamics::realisability::{Amplitudes, bode_chart, demands, responses};
+use dynamics::sweep::RunControl;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 
@@ -16,7 +16,7 @@ const SQUARE_V: f64 = 0.1;
 const SINE_V: f64 = 1.0;
 
 /// The figures, drawn from closed forms.
-pub fn characteristics(named: &Named, _quality: Quality, watch: Watch) -> Made {
+pub fn characteristics(named: &Named, _quality: Quality, watch: RunControl) -> Made {
     let (name, scenario) = (&named.name, &named.scenario);
     let forces = tires(scenario, GREATEST_RAD);
     let mut material = Material::default();

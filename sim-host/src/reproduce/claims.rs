@@ -1,8 +1,8 @@
 //! The paper's claims held against what was measured.
 
-use crate::chaos::attractor::Kind;
-use crate::chaos::regions::{Regions, Sample};
 use crate::paper::{CLAIMS, REGION_EDGES_RPM, Reproduced, chaos_begins_at};
+use dynamics::attractor::Kind;
+use dynamics::regions::{Regions, Sample};
 use serde::{Deserialize, Serialize};
 
 /// A claim with its judgement under one preset.
@@ -126,7 +126,7 @@ pub fn of_square_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
 /// Judges C7 and C8 by a sweep over the amplitude of the sine dither at 1750 rpm.
 pub fn of_sine_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
     let share = share(sweep, 0.8, 1.2, |kind| kind == Kind::Periodic(1));
-    let ones = |edge: &&crate::chaos::regions::Edge| {
+    let ones = |edge: &&dynamics::regions::Edge| {
         edge.above == Kind::Periodic(1) || edge.below == Kind::Periodic(1)
     };
     let edges: Vec<String> = sweep
@@ -195,9 +195,8 @@ fn kind_at(sweep: &Regions, value: f64) -> Option<Kind> {
 
 /// Share of a range that regions of the wanted kinds take.
 fn share(sweep: &Regions, from: f64, to: f64, wanted: impl Fn(Kind) -> bool) -> f64 {
-    let overlap = |region: &crate::chaos::regions::Region| {
-        (region.to.min(to) - region.from.max(from)).max(0.0)
-    };
+    let overlap =
+        |region: &dynamics::regions::Region| (region.to.min(to) - region.from.max(from)).max(0.0);
     let held = sweep.regions.iter().filter(|region| wanted(region.kind));
     held.map(overlap).sum::<f64>() / (to - from)
 }
@@ -226,7 +225,7 @@ fn composition(sweep: &Regions, from: f64, to: f64) -> String {
 fn nearest_edge_of_chaos(sweep: &Regions, claimed: f64) -> Option<(f64, f64)> {
     let begins = chaos_begins_at(claimed);
     let of_chaos = sweep.edges.iter().filter(|edge| edge.is_of_chaos(begins));
-    let apart = |edge: &&crate::chaos::regions::Edge| (edge.middle() - claimed).abs();
+    let apart = |edge: &&dynamics::regions::Edge| (edge.middle() - claimed).abs();
     let nearest = of_chaos.min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
     Some((nearest.middle(), 0.5 * (nearest.upper - nearest.lower)))
 }

@@ -2,9 +2,9 @@
 
 use super::piece::{Material, Named};
 use super::{Made, Quality};
-use crate::chaos::attractor::attractor;
-use crate::chaos::sweep::{SweepError, Timing, Watch};
-use crate::motion::is_bounded;
+use dynamics::attractor::attractor;
+use dynamics::sweep::{RunControl, SweepError, Timing};
+use engine::is_bounded;
 use nalgebra::Vector4;
 use shared_model::Scenario;
 use shared_model::dither::{Injection, Waveform};
@@ -17,7 +17,7 @@ const GRAVITY_M_PER_S2: f64 = 9.81;
 const PRINTED_RUN_S: f64 = 200.0;
 
 /// The experiments.
-pub fn errata(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn errata(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let timing = match quality {
         Quality::Quick => Timing::new(60.0, 160.0),
         Quality::Full => Timing::new(200.0, 500.0),

@@ -2,12 +2,12 @@
 
 use super::piece::{Drawing, Material, Named, Table};
 use super::{Made, Quality};
-use crate::averaging;
-use crate::chaos::period::{TOLERANCE, period};
-use crate::chaos::sweep::Watch;
-use crate::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use crate::simulate::{settle, simulate, started_at};
-use crate::trace::Trace;
+use dynamics::averaging;
+use dynamics::period::{TOLERANCE, period};
+use dynamics::simulate::{settle, simulate, started_at};
+use dynamics::sweep::RunControl;
+use dynamics::trace::Trace;
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::vehicle::{SIDESLIP, YAW_RATE};
@@ -28,7 +28,7 @@ const CONTROLLED: [(Waveform, f64, &str); 2] =
     [(Waveform::Square, 0.1, "12"), (Waveform::Sine, 1.0, "17")];
 
 /// Figures 12 and 17: time response of the slip angle with the dither from 3 s on, and phase portrait.
-pub fn suppression(named: &Named, _quality: Quality, watch: Watch) -> Made {
+pub fn suppression(named: &Named, _quality: Quality, watch: RunControl) -> Made {
     let mut base = named.scenario;
     base.run.wheel_speed_rpm = DITHERED_RPM;
     base.run.duration_s = RUN_S;
@@ -138,7 +138,7 @@ fn table(before: &Trace, after: &Trace) -> Table {
 }
 
 /// The true signal against the averaged system from 200 to 20,000 rad/s.
-pub fn averaging(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn averaging(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let (count, decades) = match quality {
         Quality::Quick => (3, 1.3),
         Quality::Full => (17, 2.0),

@@ -3,15 +3,16 @@
 
 use super::piece::{Drawing, Material, Named, Table, csv_of};
 use super::{Made, Quality};
-use crate::chaos::attractor::{Attractor, attractors};
-use crate::chaos::method::{Estimate, Method, estimates};
-use crate::chaos::poincare::{Direction, Section, SectionError, crossings};
-use crate::chaos::power_spectrum::welch;
-use crate::chaos::sweep::{SweepError, Timing, Watch};
-use crate::chaos::synchronisation::Search;
-use crate::component::Component;
-use crate::report::chart::{AxisSpec, Chart, Look, Panel, Series};
-use crate::simulate::{settle, simulate, started_at};
+use dynamics::attractor::{Attractor, attractors};
+use dynamics::component::Component;
+use dynamics::component::panel_of_states;
+use dynamics::method::{Estimate, Method, estimates};
+use dynamics::poincare::{Direction, Section, SectionError, crossings};
+use dynamics::power_spectrum::welch;
+use dynamics::simulate::{settle, simulate, started_at};
+use dynamics::sweep::{RunControl, SweepError, Timing};
+use dynamics::synchronisation::Search;
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::vehicle::YAW_RATE;
@@ -29,7 +30,7 @@ fn at_speed(scenario: &Scenario<f64>, wheel_speed_rpm: f64) -> Scenario<f64> {
 }
 
 /// The largest exponent by three methods and to the letter of (20), and all four exponents.
-pub fn exponents(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn exponents(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let timing = match quality {
         Quality::Quick => Timing::new(60.0, 200.0)?,
         Quality::Full => Timing::new(TRANSIENT_S, 1200.0)?,
@@ -133,7 +134,7 @@ fn exponent_chart(estimates: &[Estimate]) -> Chart {
 }
 
 /// Poincaré section and frequency spectrum at 1750 rpm.
-pub fn motion(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn motion(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let mut scenario = at_speed(&named.scenario, 1750.0);
     scenario.run.duration_s = match quality {
         Quality::Quick => 200.0,
@@ -182,7 +183,7 @@ fn section(named: &Named, scenario: &Scenario<f64>) -> Result<Drawing, SectionEr
             heading: "Poincar\u{e9} section of the chaotic motion".into(),
             panels: vec![Panel {
                 caption: section.to_string(),
-                ..Panel::of_states(
+                ..panel_of_states(
                     (Component::SIDESLIP, Component::STEERING_ANGLE),
                     found.iter().map(|crossing| crossing.x),
                     Look::Dots,
@@ -256,7 +257,7 @@ fn spectrum(named: &Named, scenario: &Scenario<f64>) -> Result<Drawing, SweepErr
 }
 
 /// How the findings depend on the lengths of transient and run.
-pub fn lengths(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn lengths(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let (transients_s, runs_s): (&[f64], &[f64]) = match quality {
         Quality::Quick => (&[0.0, 60.0], &[60.0, 150.0]),
         Quality::Full => (&[0.0, 50.0, 200.0, 1000.0], &[100.0, 300.0, 1000.0, 3000.0]),

@@ -16,8 +16,8 @@ pub use page::CLAIMS;
 #[doc(hidden)]
 pub use piece::Product;
 
-use crate::chaos::sweep::{SweepError, Watch};
 use anyhow::Context;
+use dynamics::sweep::{RunControl, SweepError};
 use piece::Piece;
 use shared_model::Scenario;
 use std::path::Path;
@@ -136,7 +136,7 @@ fn make(
         return Ok(None);
     }
     let done = || on_progress(Progress::Point);
-    let watch = Watch { stop, done: &done };
+    let watch = RunControl { stop, done: &done };
     let made = (piece.make)(&piece.scenario, options.quality, watch);
     let made = made.with_context(|| format!("{} cannot be made", piece.title))?;
     // Half a sweep is not a piece: another run makes it anew.

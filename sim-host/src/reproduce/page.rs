@@ -3,11 +3,11 @@
 use super::claims::{Judgement, says};
 use super::piece::Product;
 use super::{Options, Quality};
-use crate::output::{make_folder, write_json, write_text};
 use crate::paper::Reproduced;
-use crate::report::html;
 use anyhow::Context;
+use files::output::{make_folder, write_json, write_text};
 use maud::{Markup, PreEscaped, html};
+use plot::page;
 use std::fs;
 use std::path::Path;
 
@@ -47,8 +47,8 @@ pub fn write(
         (table(judgements))
         @for piece in &pieces { (piece) }
     };
-    let page = html::document(TITLE, &body).into_string();
-    write_text(&folder.join("index.html"), &page, true)
+    let page = page::document(TITLE, &body).into_string();
+    Ok(write_text(&folder.join("index.html"), &page, true)?)
 }
 
 fn table(judgements: &[Judgement]) -> Markup {

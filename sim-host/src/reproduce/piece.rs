@@ -4,11 +4,11 @@ use super::claims::Judgement;
 use super::{
     Made, Options, Quality, characteristics, errata, figures, measures, sensitivity, sweeps,
 };
-use crate::bounded;
-use crate::chaos::observe::is_fit;
-use crate::chaos::sweep::Watch;
-use crate::output::{make_folder, write_json, write_text};
-use crate::report::chart::Chart;
+use dynamics::observe::is_supported;
+use dynamics::sweep::RunControl;
+use files::input;
+use files::output::{make_folder, write_json, write_text};
+use plot::chart::Chart;
 use serde::{Deserialize, Serialize};
 use shared_model::Scenario;
 use std::path::Path;
@@ -24,7 +24,7 @@ pub struct Piece {
     /// What it is made of.
     pub scenario: Named,
     /// Makes it.
-    pub make: fn(&Named, Quality, Watch) -> Made,
+    pub make: fn(&Named, Quality, RunControl) -> Made,
 }
 
 /// A preset or vehicle with its name.
@@ -94,14 +94,14 @@ struct Part {
     /// Its share of the time, measured in seconds on two cores at full quality: where the engine follows the motions, and where the
     /// fixed step does.
     weights: [f64; 2],
-    make: fn(&Named, Quality, Watch) -> Made,
+    make: fn(&Named, Quality, RunControl) -> Made,
 }
 
 const fn part(
     name: &'static str,
     title: &'static str,
     weights: [f64; 2],
-    make: fn(&Named, Quality, Watch) -> Made,
+    make: fn(&Named, Quality, RunControl) -> Made,
 ) -> Part {
     Part {
         name,
@@ -187,7 +187,7 @@ pub fn all(options: &Options) -> Vec<Piece> {
     let mut pieces = Vec::new();
     for (k, (name, scenario)) in options.scenarios.iter().enumerate() {
         let once = if k == 0 { ONCE.as_slice() } else { &[] };
-        let by_engine = is_fit(scenario).unwrap_or(false);
+        let by_engine = is_supported(scenario).unwrap_or(false);
         for part in PARTS.iter().chain(once) {
             pieces.push(Piece {
                 name: format!("{}-{name}", part.name),
@@ -207,7 +207,7 @@ pub fn all(options: &Options) -> Vec<Piece> {
 impl Piece {
     /// The piece as an earlier run left it, if it was made of the same.
     pub fn kept(&self, folder: &Path, options: &Options) -> Option<Product> {
-        let text = bounded::read_text(&self.record(folder), bounded::TEXT_BYTES).ok()?;
+        let text = input::read_text(&self.record(folder), input::TEXT_BYTES).ok()?;
         let product: Product = serde_json::from_str(&text).ok()?;
         let same = product.fingerprint == self.fingerprint(options);
         let whole = || {
@@ -229,7 +229,7 @@ impl Piece {
         make_folder(&figures)?;
         for drawing in &material.drawings {
             let at = |ending| figures.join(format!("{}.{ending}", drawing.name));
-            write_text(&at("svg"), &drawing.chart.svg()?, true)?;
+            write_text(&at("svg"), &drawing.chart.svg(), true)?;
             write_text(&at("csv"), &drawing.csv, true)?;
         }
         let mut product = Product {
@@ -255,7 +255,7 @@ impl Piece {
 
     /// What the piece is made from.
     fn fingerprint(&self, options: &Options) -> String {
-        let parameters = crate::config::to_toml(&self.scenario.scenario);
+        let parameters = dynamics::config::to_toml(&self.scenario.scenario);
         format!(
             "{} {:?}\n{parameters}",
             env!("CARGO_PKG_VERSION"),
@@ -277,7 +277,7 @@ impl Product {
         for (name, _) in &self.figures {
             for ending in ["svg", "csv"] {
                 let path = folder.join(format!("figures/{name}.{ending}"));
-                digest.update(&bounded::read(&path, bounded::RECORDING_BYTES, |_| true)?);
+                digest.update(&input::read(&path, input::RECORDING_BYTES, |_| true)?);
             }
         }
         Ok(format!("{:08x}", digest.finalize()))

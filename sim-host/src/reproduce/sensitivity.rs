@@ -2,10 +2,10 @@
 
 use super::piece::{Drawing, Material, Named, Table};
 use super::{Made, Quality};
-use crate::chaos::regions::{Edge, Regions, regions};
-use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch};
 use crate::paper::{REGION_EDGES_RPM, chaos_begins_at};
-use crate::report::chart::{AxisSpec, Chart, Look, Panel, Series};
+use dynamics::regions::{Edge, Regions, regions};
+use dynamics::sweep::{Parameter, RunControl, SweepError, Timing, Values};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::Scenario;
 use shared_model::friction::FrictionLaw;
 use shared_model::vehicle::SlipForm;
@@ -14,7 +14,7 @@ use shared_model::vehicle::SlipForm;
 const NEAR_RPM: f64 = 60.0;
 
 /// Edges over the coefficient of friction, the best fit of it, and the edges under other readings.
-pub fn sensitivity(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn sensitivity(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let coefficients: &[f64] = match quality {
         Quality::Quick => &[0.24, 0.28, 0.32],
         Quality::Full => &[
@@ -90,7 +90,7 @@ const READINGS: [Reading; 5] = [
 fn edges(
     scenario: &Scenario<f64>,
     quality: Quality,
-    watch: Watch,
+    watch: RunControl,
 ) -> Result<[Option<f64>; 3], SweepError> {
     let (step, width, timing) = match quality {
         Quality::Quick => (20.0, 5.0, Timing::new(40.0, 100.0)?),

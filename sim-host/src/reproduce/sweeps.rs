@@ -3,10 +3,10 @@
 use super::figures::name_of;
 use super::piece::{Drawing, Material, Named, Table};
 use super::{Made, Quality, claims};
-use crate::chaos::regions::{Regions, regions};
-use crate::chaos::sweep::{Parameter, SweepError, Timing, Values, Watch};
 use crate::paper::REGION_EDGES_RPM;
-use crate::report::chart::{AxisSpec, Chart, Look, Panel, Region, Series};
+use dynamics::regions::{Regions, regions};
+use dynamics::sweep::{Parameter, RunControl, SweepError, Timing, Values};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Region, Series};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 
@@ -22,7 +22,7 @@ fn timing(quality: Quality) -> Result<Timing, SweepError> {
 }
 
 /// Figures 6 and 7.
-pub fn speed(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn speed(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let (step, width) = match quality {
         Quality::Quick => (10.0, 4.0),
         Quality::Full => (2.0, 0.5),
@@ -78,7 +78,7 @@ pub fn speed(named: &Named, quality: Quality, watch: Watch) -> Made {
 }
 
 /// Figure 8.
-pub fn square(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn square(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let (sweep, drawing) = amplitude(named, quality, watch, Waveform::Square, 0.14, "08")?;
     Ok(Material {
         drawings: vec![drawing],
@@ -88,7 +88,7 @@ pub fn square(named: &Named, quality: Quality, watch: Watch) -> Made {
 }
 
 /// Figure 13.
-pub fn sine(named: &Named, quality: Quality, watch: Watch) -> Made {
+pub fn sine(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let (sweep, drawing) = amplitude(named, quality, watch, Waveform::Sine, 1.4, "13")?;
     Ok(Material {
         drawings: vec![drawing],
@@ -100,7 +100,7 @@ pub fn sine(named: &Named, quality: Quality, watch: Watch) -> Made {
 fn amplitude(
     named: &Named,
     quality: Quality,
-    watch: Watch,
+    watch: RunControl,
     waveform: Waveform,
     greatest_v: f64,
     number: &str,
@@ -149,14 +149,14 @@ fn sweep(
     values: &Values,
     width: f64,
     quality: Quality,
-    watch: Watch,
+    watch: RunControl,
 ) -> Result<Regions, SweepError> {
     regions(scenario, parameter, values, width, timing(quality)?, watch)
 }
 
 fn exponent_chart(sweep: &Regions, shaded: &[Region]) -> Chart {
     let with = |value: fn(f64, f64) -> f64| {
-        let point = |sample: &crate::chaos::regions::Sample| {
+        let point = |sample: &dynamics::regions::Sample| {
             let attractor = &sample.attractor;
             let exponent = attractor.exponent_per_s?;
             Some((
@@ -206,7 +206,7 @@ fn orbit_chart(
     parameter: Parameter,
     regions: Vec<Region>,
 ) -> Chart {
-    let maxima = |sample: &crate::chaos::regions::Sample| {
+    let maxima = |sample: &dynamics::regions::Sample| {
         let value = sample.value;
         let heights = sample.attractor.maxima_rad_per_s.clone();
         heights.into_iter().map(move |height| (value, height))

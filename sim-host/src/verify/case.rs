@@ -1,16 +1,16 @@
 //! The cases of a verification: which runs there are, and what is measured of each.
 
 use super::{Options, Progress, VerifyError};
-use crate::chaos::lyapunov::{self, Exponent};
-use crate::chaos::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
-use crate::equivalence::{self, Bits, OneStep};
-use crate::instructions::Instructions;
-use crate::pil::qemu::{self, Finished, Machine, RunError};
-use crate::pil::settings;
-use crate::pil::telemetry::Recording;
 use crate::report::RunReport;
-use crate::simulate::{Unsettled, early_end, settle, simulate, started_at};
-use crate::trace::Trace;
+use dynamics::lyapunov::{self, Exponent};
+use dynamics::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
+use dynamics::simulate::{Unsettled, early_end, settle, simulate, started_at};
+use dynamics::trace::Trace;
+use pil::equivalence::{self, Bits, OneStep, trace_of};
+use pil::instructions::Instructions;
+use qemu::settings;
+use qemu::telemetry::Recording;
+use qemu::{self, Finished, Machine, RunError};
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::servo::Pwm;
@@ -198,7 +198,7 @@ pub(super) fn run(
     }
     let (recording, log) = run_firmware(&case, &rounded, options, on_progress)?;
 
-    let firmware = recording.trace();
+    let firmware = trace_of(&recording);
     let settled = match case.scenario.dither.waveform {
         Waveform::None => 0,
         _ => firmware.index_after(case.scenario.dither.start_time_s + DITHER_TRANSIENT_S),

@@ -1,11 +1,12 @@
 //! The checks of a verification: the four levels of equivalence, and what the firmware needs.
 
 use super::case::{Analysis, DITHER_TRANSIENT_S, Expected, Outcome, Role};
-use crate::chaos::period::mean_cycle_s;
-use crate::equivalence;
-use crate::instructions::{Instructions, median, most};
-use crate::pil::elf::Image;
-use crate::verdict::{Check, figure};
+use dynamics::period::mean_cycle_s;
+use image::Image;
+use pil::equivalence;
+use pil::instructions::{Instructions, median, most};
+use plot::number::four_digits;
+use plot::verdict::Check;
 
 /// Free f32 and f64 runs of a periodic motion never get this far apart, over the attractor's size: a hundredth of what counts
 /// as parted.
@@ -66,7 +67,7 @@ fn one_step(outcome: &Outcome, analysis: &Analysis) -> Check {
     Check::at_most(id("one-step", outcome), title, analysis.one_step.worst(), 1.0).detail(format!(
         "{} steps; bound by running error analysis; root mean square defect {} of the attractor's size",
         analysis.one_step.ratios.len(),
-        figure(analysis.one_step.relative_rms)
+        four_digits(analysis.one_step.relative_rms)
     ))
 }
 

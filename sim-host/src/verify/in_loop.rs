@@ -2,14 +2,14 @@
 
 use super::checks::load;
 use super::{Options, Progress, VerifyError};
-use crate::closed_loop::levels::{Levels, Target, drive};
-use crate::closed_loop::manoeuvre::Manoeuvre;
-use crate::closed_loop::run::Comparison;
-use crate::instructions::Instructions;
-use crate::pil::qemu::{Machine, RunError};
-use crate::pil::session::LinkKind;
 use crate::report::DriveReport;
-use crate::verdict::Check;
+use pil::instructions::Instructions;
+use pil::levels::{Levels, Target, drive};
+use pil::manoeuvre::Manoeuvre;
+use pil::run::Comparison;
+use plot::verdict::Check;
+use qemu::session::LinkKind;
+use qemu::{Machine, RunError};
 use rayon::prelude::*;
 use shared_model::dither::Waveform;
 
@@ -52,10 +52,7 @@ fn one(
         time_out: options.time_out,
     };
     let levels = drive(&scenario, &manoeuvre, &target, || {}).map_err(|source| {
-        if matches!(
-            source,
-            crate::closed_loop::levels::LevelError::Run(RunError::Interrupted)
-        ) {
+        if matches!(source, pil::levels::LevelError::Run(RunError::Interrupted)) {
             return VerifyError::Interrupted;
         }
         VerifyError::InLoop {

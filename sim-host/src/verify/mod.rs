@@ -6,13 +6,13 @@ mod in_loop;
 mod proofs;
 mod suppression;
 
-use crate::motion::EarlyEnd;
-use crate::pil::elf::Image;
-use crate::pil::qemu::RunError;
-use crate::pil::telemetry::TelemetryError;
 use crate::report::{DriveReport, Pair, RunReport};
-use crate::verdict::{Check, Verdict};
 use case::{Outcome, Role};
+use engine::EarlyEnd;
+use image::Image;
+use plot::verdict::{Check, Verdict};
+use qemu::RunError;
+use qemu::telemetry::TelemetryError;
 use rayon::prelude::*;
 use shared_model::{InvalidScenario, Scenario};
 use std::time::Duration;
@@ -85,7 +85,7 @@ pub enum VerifyError {
         /// The manoeuvre.
         title: String,
         /// Why.
-        source: Box<crate::closed_loop::levels::LevelError>,
+        source: Box<pil::levels::LevelError>,
     },
     /// No place for telemetry.
     #[error("cannot make a temporary folder: {0}")]

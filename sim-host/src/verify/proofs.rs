@@ -2,8 +2,8 @@
 
 use super::Options;
 use super::case::Outcome;
-use crate::image::stack::Stack;
-use crate::verdict::Check;
+use image::stack::Stack;
+use plot::verdict::Check;
 
 /// Checks of the stack's bound against the RAM that there is for it, and of the depths that were measured against the bound.
 pub(super) fn stack(options: &Options, outcomes: &[Outcome]) -> Vec<Check> {
@@ -63,12 +63,12 @@ pub(super) fn stack(options: &Options, outcomes: &[Outcome]) -> Vec<Check> {
 
 fn analyse(options: &Options) -> Result<Stack, String> {
     let framed = options.framed_image.as_ref().map_err(String::clone)?;
-    let sizes = |image: &crate::pil::elf::Image| (image.flash_bytes, image.ram_bytes);
+    let sizes = |image: &image::Image| (image.flash_bytes, image.ram_bytes);
     if sizes(framed) != sizes(&options.image) {
         return Err(format!(
             "{} is no build of the firmware that ran: other sizes; run `cargo xtask proofs`",
             framed.path.display()
         ));
     }
-    Stack::analyse(&framed.bytes).map_err(|error| error.to_string())
+    Stack::analyse(&framed.bytes, &crate::firmware::PRIORITIES).map_err(|error| error.to_string())
 }

@@ -3,10 +3,10 @@
 use super::case::{Outcome, Role};
 use super::checks::chaotic;
 use super::find;
-use crate::chaos::lyapunov::Exponent;
-use crate::chaos::period::Period;
 use crate::report::Pair;
-use crate::verdict::Check;
+use dynamics::lyapunov::Exponent;
+use dynamics::period::Period;
+use plot::verdict::Check;
 use shared_model::dither::Waveform;
 use shared_model::vehicle::YAW_RATE;
 use std::f64::consts::TAU;

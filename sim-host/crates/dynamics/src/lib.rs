@@ -1,5 +1,32 @@
-//! Trajectories of the vehicle model on the host: integrators for analysis, and the arithmetics that they are generic over.
+#![doc = include_str!("../README.md")]
 
-pub mod engine;
-pub mod interrupt;
-pub mod motion;
+pub mod attractor;
+pub mod averaging;
+pub mod basin;
+pub mod characteristics;
+pub mod component;
+pub mod config;
+pub mod convergence;
+mod decimal;
+pub mod eigenvalues;
+pub mod equilibria;
+pub mod extrema;
+pub mod fixed_step;
+pub mod flow;
+pub mod lyapunov;
+pub mod map;
+pub mod method;
+pub mod observe;
+pub mod orbit;
+pub mod period;
+pub mod poincare;
+pub mod power_spectrum;
+pub mod realisability;
+pub mod regions;
+pub mod schedule;
+pub mod simulate;
+pub mod sweep;
+pub mod synchronisation;
+pub mod trace;
+pub mod two_particle;
+pub mod words;

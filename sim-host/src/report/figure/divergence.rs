@@ -1,19 +1,21 @@
 //! Distance of the f32 and f64 runs against time.
 
-use super::axis::Axis;
-use super::panel::{Panel, stack, stack_height};
-use super::reduce::{Point, maxima};
-use super::style::{Area, INSTANT, LIMIT, Line, RUNS, Sample, figure};
 use crate::report::RunReport;
-use crate::verdict;
+use plot::axes::{Axes, stack, stack_height};
+use plot::axis::Axis;
+use plot::canvas::{Area, Line};
+use plot::figure::{Sample, figure};
+use plot::number::four_digits;
+use plot::reduce::{Point, maxima};
+use plot::style::{INSTANT, LIMIT, RUNS};
 
 const BUCKETS: usize = 400;
-const PANEL: u32 = 340;
+const PANEL: i32 = 340;
 const ROOM: f64 = 1.2;
 
 /// The figure: a panel for each run that chaos parts, and one for those that must never part. Runs
 /// without distances are left out.
-pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
+pub fn draw(runs: &[RunReport]) -> String {
     let styled: Vec<(&RunReport, Line)> = runs
         .iter()
         .filter(|run| !run.divergence.is_empty())
@@ -68,12 +70,11 @@ pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
         let end_s = end_s(runs, values().map(|p| p.0).fold(0.0, f64::max));
         let rows = stack(area, groups.len(), PANEL, "time (s)");
         for ((area, time), group) in rows.iter().zip(&groups) {
-            panel(area, group, Axis::linear(time, 0.0, end_s, 12), y.clone())?;
+            panel(area, group, Axis::linear(time, 0.0, end_s, 12), y.clone());
         }
         if groups.is_empty() {
-            Panel::new(area, ("", ""), Axis::linear("time (s)", 0.0, 1.0, 5), y)?.no_data()?;
+            Axes::new(area, ("", ""), Axis::linear("time (s)", 0.0, 1.0, 5), y).no_data();
         }
-        Ok(())
     })
 }
 
@@ -85,7 +86,7 @@ struct Group<'a> {
 }
 
 fn horizon_text([least, expected, greatest]: [f64; 3]) -> String {
-    let [least, expected, greatest] = [least, expected, greatest].map(verdict::figure);
+    let [least, expected, greatest] = [least, expected, greatest].map(four_digits);
     format!("predicted at {expected} s, {least} to {greatest} s")
 }
 
@@ -97,20 +98,20 @@ fn end_s(runs: &[RunReport], data_end_s: f64) -> f64 {
         .fold(data_end_s, f64::max)
 }
 
-fn panel(area: &Area, group: &Group, x: Axis, y: Axis) -> anyhow::Result<()> {
-    let panel = Panel::new(area, (&group.caption, &group.remark), x, y)?;
+fn panel(area: &Area, group: &Group, x: Axis, y: Axis) {
+    let panel = Axes::new(area, (&group.caption, &group.remark), x, y);
     let runs = &group.runs;
     for horizon in runs.iter().filter_map(|(run, _)| run.horizon_s) {
-        panel.band(horizon[0], horizon[2])?;
+        panel.band(horizon[0], horizon[2]);
     }
     for horizon in runs.iter().filter_map(|(run, _)| run.horizon_s) {
-        panel.instant(horizon[1], INSTANT)?;
+        panel.instant(horizon[1], INSTANT);
     }
     let mut limits: Vec<f64> = runs.iter().map(|(run, _)| run.divergence_limit).collect();
     limits.sort_by(f64::total_cmp);
     limits.dedup();
     for limit in limits.into_iter().filter(|limit| limit.is_finite()) {
-        panel.level(limit, LIMIT)?;
+        panel.level(limit, LIMIT);
     }
     let curves: Vec<(Vec<Point>, Line)> = runs
         .iter()

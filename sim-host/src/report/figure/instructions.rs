@@ -1,13 +1,15 @@
 //! Histograms of the instructions that the tasks took.
 
-use super::axis::Axis;
-use super::panel::{Panel, stack, stack_height};
-use super::style::{Area, MAIN, WIDTH, figure};
-use crate::instructions::{Histogram, Instructions, most};
+use pil::instructions::{Histogram, Instructions, most};
+use plot::axes::{Axes, stack, stack_height};
+use plot::axis::Axis;
+use plot::canvas::Area;
+use plot::figure::figure;
+use plot::style::{MAIN, WIDTH};
 
 /// About the number of bars across a panel.
 const BARS: f64 = 100.0;
-const PANEL: u32 = 190;
+const PANEL: i32 = 190;
 /// Where the count axis begins, so that a count of 1 has a bar.
 const LEAST: f64 = 0.5;
 
@@ -15,10 +17,10 @@ const LEAST: f64 = 0.5;
 type Bar = (f64, f64, f64);
 
 /// The figure: a row for each run, named on the left; there the control task, on the right the PWM task.
-pub fn draw(runs: &[(&str, &Instructions)]) -> anyhow::Result<String> {
+pub fn draw(runs: &[(&str, &Instructions)]) -> String {
     let heading = "Instructions of the control task (left) and of the PWM task (right)";
     figure(heading, &[], stack_height(runs.len(), PANEL), |area| {
-        let (left, right) = area.split_horizontally(WIDTH / 2);
+        let (left, right) = area.split_right(WIDTH / 2);
         let control: Vec<Row> = runs
             .iter()
             .map(|(title, run)| Row {
@@ -26,7 +28,7 @@ pub fn draw(runs: &[(&str, &Instructions)]) -> anyhow::Result<String> {
                 histogram: &run.control,
             })
             .collect();
-        column(&left, "instructions of a control task", &control)?;
+        column(&left, "instructions of a control task", &control);
         let pwm: Vec<Row> = runs
             .iter()
             .map(|(_, run)| Row {
@@ -48,7 +50,7 @@ struct Row<'a> {
 }
 
 /// The histograms of one task on common axes.
-fn column(area: &Area, name: &str, rows: &[Row]) -> anyhow::Result<()> {
+fn column(area: &Area, name: &str, rows: &[Row]) {
     let all = rows.iter().flat_map(|row| row.histogram);
     let x = Axis::around(name, all.map(|entry| f64::from(entry.0)), 9);
     let width = ((x.high - x.low) / BARS).floor().max(1.0);
@@ -57,10 +59,9 @@ fn column(area: &Area, name: &str, rows: &[Row]) -> anyhow::Result<()> {
     let y = Axis::decades("count", counts.chain([LEAST, 1.0]), 4);
     let panels = stack(area, rows.len(), PANEL, name);
     for (((area, name), row), bars) in panels.iter().zip(rows).zip(&bars) {
-        let panel = Panel::new(area, (&row.caption, ""), x.named(name), y.clone())?;
-        panel.bars(bars, MAIN.colour)?;
+        let panel = Axes::new(area, (&row.caption, ""), x.named(name), y.clone());
+        panel.bars(bars, MAIN.colour);
     }
-    Ok(())
 }
 
 /// The histogram in bins of the given width: bars around the values, and their counts.

@@ -1,20 +1,10 @@
 //! The figures, each an SVG document.
 
-pub(super) mod axis;
-mod colour_scale;
 mod divergence;
-pub(super) mod drive;
-pub(super) mod fault_matrix;
 mod instructions;
-pub(super) mod motion_map;
 mod one_step_defect;
-pub(super) mod panel;
 mod phase_portrait;
 mod pwm_trace;
-mod raster;
-pub(super) mod reduce;
-pub(super) mod schedule_map;
-pub(super) mod style;
 mod time_response;
 
 use super::ReportInput;
@@ -31,7 +21,7 @@ pub struct Figure {
 }
 
 /// All figures of a report, in the order in which they are shown. The pairs' indices must be valid.
-pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
+pub fn all(input: &ReportInput) -> Vec<Figure> {
     let mut figures = Vec::new();
     for pair in input.pairs {
         let (before, after) = (&input.runs[pair.before], &input.runs[pair.after]);
@@ -41,7 +31,7 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
                 "{}. Firmware telemetry with dither (solid) and without (dotted).",
                 pair.title
             ),
-            svg: time_response::draw(&pair.title, before, after)?,
+            svg: time_response::draw(&pair.title, before, after),
         });
         figures.push(Figure {
             name: format!("phase-portrait-{}", after.id),
@@ -49,7 +39,7 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
                 "{}. Settled motion: the second half of each run, on the same axes.",
                 pair.title
             ),
-            svg: phase_portrait::draw(&pair.title, before, after)?,
+            svg: phase_portrait::draw(&pair.title, before, after),
         });
     }
     if input.runs.iter().any(|run| run.dither_start_s.is_some()) {
@@ -58,7 +48,7 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
             caption: "Voltage of each PWM period from its duty code around the dither's start: \
                 the dither as the motor's half bridge gets it, quantised in time and in counts."
                 .into(),
-            svg: pwm_trace::draw(input.runs)?,
+            svg: pwm_trace::draw(input.runs),
         });
     }
     figures.push(Figure {
@@ -69,7 +59,7 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
             expected); below them the runs that must never reach the limit. Greatest value in each \
             drawn interval."
                 .into(),
-        svg: divergence::draw(input.runs)?,
+        svg: divergence::draw(input.runs),
     });
     figures.push(Figure {
         name: "one-step-defect".into(),
@@ -77,7 +67,7 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
             same state, over its rounding bound: at most 1 passes. Greatest value in each drawn \
             interval; smaller ones than the axis shows lie on its lower edge."
             .into(),
-        svg: one_step_defect::draw(input.runs)?,
+        svg: one_step_defect::draw(input.runs),
     });
     let runs = input.runs.iter();
     let runs = runs.map(|run| (run.title.as_str(), &run.instructions));
@@ -89,7 +79,7 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
         caption: "How often the control task, and the slowest PWM task of each step, took how \
             many instructions."
             .into(),
-        svg: instructions::draw(&rows)?,
+        svg: instructions::draw(&rows),
     });
     for driven in input.drives {
         figures.push(Figure {
@@ -98,10 +88,10 @@ pub fn all(input: &ReportInput) -> anyhow::Result<Vec<Figure>> {
                 "{}. The vehicle on the host, the ECU on the emulated target, one exchange a PWM period.",
                 driven.title
             ),
-            svg: drive::draw(&driven.title, &driven.run)?,
+            svg: pil::figure::draw(&driven.title, &driven.run),
         });
     }
-    Ok(figures)
+    figures
 }
 
 #[cfg(test)]
@@ -119,7 +109,7 @@ mod tests {
             after: 0,
         }];
         let runs = [run];
-        all(&sample::input(&verdict, &runs, &pairs)).unwrap()
+        all(&sample::input(&verdict, &runs, &pairs))
     }
 
     #[test]

@@ -1,20 +1,21 @@
 //! The one-step defect over its bound against time.
 
-use super::axis::Axis;
-use super::panel::{Panel, stack, stack_height};
-use super::reduce::{Point, maxima};
-use super::style::{LIMIT, MAIN, Sample, figure};
 use crate::report::RunReport;
-use crate::verdict;
+use plot::axes::{Axes, stack, stack_height};
+use plot::axis::Axis;
+use plot::figure::{Sample, figure};
+use plot::number::four_digits;
+use plot::reduce::{Point, maxima};
+use plot::style::{LIMIT, MAIN};
 
 /// About one for each pixel.
 const BUCKETS: usize = 700;
-const PANEL: u32 = 190;
+const PANEL: i32 = 190;
 /// Where the axis begins: smaller defects are nothing to look at.
 const LEAST: f64 = 1e-4;
 
 /// The figure: a panel for each run of which there are defects.
-pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
+pub fn draw(runs: &[RunReport]) -> String {
     let legend = [
         ("greatest defect over its bound".into(), Sample::Line(MAIN)),
         ("limit".into(), Sample::Line(LIMIT)),
@@ -42,15 +43,14 @@ pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
         for ((area, time), (title, points)) in rows.iter().zip(&curves) {
             let greatest = points.iter().map(|point| point.1).reduce(f64::max);
             let remark = greatest.map_or(String::new(), |most| {
-                format!("greatest {}", verdict::figure(most))
+                format!("greatest {}", four_digits(most))
             });
             let x = Axis::linear(time, 0.0, end_s, 12);
-            let panel = Panel::new(area, (title, &remark), x, y.clone())?;
+            let panel = Axes::new(area, (title, &remark), x, y.clone());
             if greatest.is_some() {
-                panel.level(1.0, LIMIT)?;
+                panel.level(1.0, LIMIT);
             }
-            panel.lines(&[(points, MAIN)])?;
+            panel.lines(&[(points, MAIN)]);
         }
-        Ok(())
     })
 }

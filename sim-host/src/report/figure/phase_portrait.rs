@@ -1,23 +1,25 @@
 //! Yaw rate against sideslip angle, without dither and with it.
 
-use super::axis::Axis;
-use super::panel::{CAPTION, Panel, TICKS_AND_NAME};
-use super::reduce::{Point, curve};
-use super::style::{ALONE, Line, MAIN, WIDTH, figure};
 use crate::report::RunReport;
-use crate::trace::Trace;
+use dynamics::trace::Trace;
+use plot::axes::{Axes, CAPTION, TICKS_AND_NAME};
+use plot::axis::Axis;
+use plot::canvas::Line;
+use plot::figure::figure;
+use plot::reduce::{Point, curve};
+use plot::style::{ALONE, MAIN, WIDTH};
 use shared_model::vehicle::{SIDESLIP, YAW_RATE};
 
 const MOST_POINTS: usize = 4000;
-const PANEL: u32 = 560;
+const PANEL: i32 = 560;
 /// A motion that stays within this many units of the drawing is marked by a dot.
 const DOT: f64 = 8.0;
 
 /// The figure for a run without dither and one with it.
-pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> anyhow::Result<String> {
+pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> String {
     let heading = format!("Phase portrait of the settled motion \u{2013} {title}");
     figure(&heading, &[], CAPTION + PANEL + TICKS_AND_NAME, |area| {
-        let (left, right) = area.split_horizontally(WIDTH / 2);
+        let (left, right) = area.split_right(WIDTH / 2);
         let states = [settled(&before.trace), settled(&after.trace)];
         let all = || {
             states
@@ -32,26 +34,24 @@ pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> anyhow::Resul
             (right, after, &states[1], MAIN, "after"),
         ] {
             let caption = format!("{word}: {}", run.title);
-            let panel = Panel::new(&area, (&caption, ""), x.clone(), y.clone())?;
-            orbit(&panel, states, line)?;
+            let panel = Axes::new(&area, (&caption, ""), x.clone(), y.clone());
+            orbit(&panel, states, line);
         }
-        Ok(())
     })
 }
 
-fn orbit(panel: &Panel, states: &[Point], line: Line) -> anyhow::Result<()> {
+fn orbit(panel: &Axes, states: &[Point], line: Line) {
     let scale = panel.units_per_place();
     let points = curve(states.iter().copied(), scale, MOST_POINTS);
-    panel.lines(&[(&points, line)])?;
+    panel.lines(&[(&points, line)]);
     if let Some(first) = points.first() {
         let near = |point: &Point| {
             (point.0 - first.0).abs() * scale.0 < DOT && (point.1 - first.1).abs() * scale.1 < DOT
         };
         if points.iter().all(near) {
-            panel.dot(*first, line)?;
+            panel.dot(*first, line);
         }
     }
-    Ok(())
 }
 
 /// The states of the run's second half.

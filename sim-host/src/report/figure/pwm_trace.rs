@@ -1,19 +1,21 @@
 //! The PWM's voltage around the dither's start.
 
-use super::axis::Axis;
-use super::panel::{Panel, stack, stack_height};
-use super::reduce::Point;
-use super::style::{Area, INSTANT, MAIN, Sample, figure};
 use crate::report::RunReport;
-use crate::verdict;
+use plot::axes::{Axes, stack, stack_height};
+use plot::axis::Axis;
+use plot::canvas::Area;
+use plot::figure::{Sample, figure};
+use plot::number::four_digits;
+use plot::reduce::Point;
+use plot::style::{INSTANT, MAIN};
 
 /// The time shown, ms from the dither's start.
 const FROM_MS: f64 = -3.0;
 const TO_MS: f64 = 12.0;
-const PANEL: u32 = 260;
+const PANEL: i32 = 260;
 
 /// The figure: a panel for each run with dither.
-pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
+pub fn draw(runs: &[RunReport]) -> String {
     let runs: Vec<(&RunReport, f64)> = runs
         .iter()
         .filter_map(|run| Some((run, run.dither_start_s?)))
@@ -27,26 +29,25 @@ pub fn draw(runs: &[RunReport]) -> anyhow::Result<String> {
     figure(heading, &legend, height, |area| {
         let rows = stack(area, runs.len(), PANEL, "time from the dither's start (ms)");
         for ((area, time), (run, start_s)) in rows.iter().zip(&runs) {
-            panel(area, time, run, *start_s)?;
+            panel(area, time, run, *start_s);
         }
-        Ok(())
     })
 }
 
-fn panel(area: &Area, time: &str, run: &RunReport, start_s: f64) -> anyhow::Result<()> {
+fn panel(area: &Area, time: &str, run: &RunReport, start_s: f64) {
     let steps = steps(run, start_s);
     let count = format!(
         "1 count = {} mV = {} % duty",
-        verdict::figure(run.volts_per_count * 1e3),
-        verdict::figure(100.0 / f64::from(run.trace.pwm_period)),
+        four_digits(run.volts_per_count * 1e3),
+        four_digits(100.0 / f64::from(run.trace.pwm_period)),
     );
-    let panel = Panel::new(
+    let panel = Axes::new(
         area,
         (&run.title, &count),
         Axis::linear(time, FROM_MS, TO_MS, 15),
         Axis::around("voltage (V)", steps.iter().map(|point| point.1), 5),
-    )?;
-    panel.lines(&[(&steps, MAIN)])?;
+    );
+    panel.lines(&[(&steps, MAIN)]);
     panel.instant(0.0, INSTANT)
 }
 

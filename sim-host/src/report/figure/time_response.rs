@@ -1,21 +1,22 @@
 //! Sideslip angle and yaw rate against time, with and without dither.
 
-use super::axis::Axis;
-use super::panel::{Panel, stack, stack_height};
-use super::reduce::{Point, extremes};
-use super::style::{INSTANT, MAIN, OTHER, Sample, figure};
 use crate::report::RunReport;
-use crate::trace::Trace;
-use crate::verdict;
+use dynamics::trace::Trace;
+use plot::axes::{Axes, stack, stack_height};
+use plot::axis::Axis;
+use plot::figure::{Sample, figure};
+use plot::number::four_digits;
+use plot::reduce::{Point, extremes};
+use plot::style::{INSTANT, MAIN, OTHER};
 use shared_model::vehicle::{SIDESLIP, YAW_RATE};
 
 /// End of the time axis, s: the oscillation's single periods are still seen.
 const END_S: f64 = 15.0;
 const BUCKETS: usize = 2000;
-const PANEL: u32 = 330;
+const PANEL: i32 = 330;
 
 /// The figure for a run without dither and one with it from the same start.
-pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> anyhow::Result<String> {
+pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> String {
     let legend = [
         (format!("with dither: {}", after.title), Sample::Line(MAIN)),
         (format!("without: {}", before.title), Sample::Line(OTHER)),
@@ -33,22 +34,21 @@ pub fn draw(title: &str, before: &RunReport, after: &RunReport) -> anyhow::Resul
             let with = curve(&after.trace, component);
             let without = curve(&before.trace, component);
             let values = with.iter().chain(&without).map(|point| point.1);
-            let panel = Panel::new(
+            let panel = Axes::new(
                 &area,
                 ("", ""),
                 Axis::linear(time, 0.0, end_s, 15),
                 Axis::around(name, values, 6),
-            )?;
-            panel.lines(&[(&without, OTHER), (&with, MAIN)])?;
+            );
+            panel.lines(&[(&without, OTHER), (&with, MAIN)]);
             if let Some(start_s) = after.dither_start_s {
-                panel.instant(start_s, INSTANT)?;
+                panel.instant(start_s, INSTANT);
                 if component == SIDESLIP {
-                    let label = format!("dither on at {} s", verdict::figure(start_s));
-                    panel.instant_label(start_s, &label)?;
+                    let label = format!("dither on at {} s", four_digits(start_s));
+                    panel.instant_label(start_s, &label);
                 }
             }
         }
-        Ok(())
     })
 }
 

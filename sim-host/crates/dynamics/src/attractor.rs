@@ -1,0 +1,272 @@
+//! What a motion ends on, and whether two motions end on the same.
+
+use crate::equilibria::Equilibrium;
+use crate::lyapunov::{Exponent, largest_of};
+use crate::observe::observe;
+use crate::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
+use crate::sweep::{RunControl, Timing};
+use engine::taylor::{Observables, Trajectory};
+use engine::{EarlyEnd, Reason};
+use shared_model::vehicle::{STEERING_ANGLE, State, YAW_RATE};
+use shared_model::{InvalidScenario, Scenario};
+
+/// Share of their joint extent that two motions' extents must have in common to be of the same attractor.
+const COMMON_PERIODIC: f64 = 0.97;
+/// The same for chaotic motions, whose extents are those of a finite time.
+const COMMON_CHAOTIC: f64 = 0.8;
+/// Most bands that are counted.
+const MAX_BANDS: usize = 6;
+/// Fewest maxima that tell a band's extent.
+const MAXIMA_PER_BAND: usize = 20;
+/// Distance within which two states of rest are the same, in each component (rad and rad/s).
+const SAME_REST: f64 = 1e-4;
+
+/// The kind of a motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// The yaw rate varies by less than 1e-6 rad/s.
+    Equilibrium,
+    /// The maxima of the yaw rate repeat after this many, and the exponent is not positive.
+    Periodic(usize),
+    /// The maxima do not repeat, and the exponent is positive.
+    Chaos,
+    /// Chaos whose maxima visit this many separate bands in turn: a diagram shows narrow ones much as it shows a period.
+    BandedChaos(usize),
+    /// Maxima and exponent disagree, or the run is too short for one of them.
+    Undecided,
+    /// The motion leaves all bounds.
+    Diverges,
+    /// The integrator could not follow the motion.
+    NotFollowed(Reason),
+}
+
+impl Kind {
+    /// Chaos, in however many bands.
+    pub fn is_chaotic(self) -> bool {
+        matches!(self, Self::Chaos | Self::BandedChaos(_))
+    }
+
+    /// The motion has an attractor that was followed to the end of the run.
+    pub fn stays(self) -> bool {
+        !matches!(self, Self::Diverges | Self::NotFollowed(_))
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Equilibrium => f.write_str("equilibrium"),
+            Self::Periodic(maxima) => write!(f, "period-{maxima}"),
+            Self::Chaos => f.write_str("chaos"),
+            Self::BandedChaos(bands) => write!(f, "{bands}-band chaos"),
+            Self::Undecided => f.write_str("undecided"),
+            Self::Diverges => f.write_str("diverges"),
+            Self::NotFollowed(reason) => write!(f, "{reason}"),
+        }
+    }
+}
+
+/// What a motion does behind its transient.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Attractor {
+    /// Its kind.
+    pub kind: Kind,
+    /// Greatest difference of maxima one cycle apart, over the yaw rate's range: the period's uncertainty. Of a motion
+    /// without a period, the least over the periods tried.
+    pub residual: Option<f64>,
+    /// Time of a cycle, s.
+    pub cycle_s: Option<f64>,
+    /// Largest Lyapunov exponent, 1/s, where it was asked for and the run is long enough.
+    pub exponent_per_s: Option<f64>,
+    /// What the exponent must exceed to count as positive, 1/s.
+    pub exponent_threshold_per_s: Option<f64>,
+    /// Maxima of the yaw rate, rad/s, descending: those of one cycle, or all where there is none.
+    pub maxima_rad_per_s: Vec<f64>,
+    /// Least value of each component of the state.
+    pub lower: [f64; 4],
+    /// Greatest value of each component of the state.
+    pub upper: [f64; 4],
+    /// The state at the end.
+    pub end: [f64; 4],
+    /// When the motion left all bounds, s.
+    pub diverges_at_s: Option<f64>,
+}
+
+impl From<EarlyEnd> for Kind {
+    fn from(end: EarlyEnd) -> Self {
+        match end.reason {
+            Reason::Diverges => Self::Diverges,
+            reason => Self::NotFollowed(reason),
+        }
+    }
+}
+
+impl Attractor {
+    fn ending_early(early: EarlyEnd, end: &State<f64>) -> Self {
+        let kind = Kind::from(early);
+        Self {
+            kind,
+            residual: None,
+            cycle_s: None,
+            exponent_per_s: None,
+            exponent_threshold_per_s: None,
+            maxima_rad_per_s: Vec::new(),
+            lower: end.x.into(),
+            upper: end.x.into(),
+            end: end.x.into(),
+            diverges_at_s: (kind == Kind::Diverges).then_some(early.time_s),
+        }
+    }
+
+    /// Of what is found of a motion; with an exponent if there is a tangent vector.
+    fn of<const K: usize>(found: &Trajectory<K>, timing: Timing) -> Self {
+        if let Some(early) = found.early_end {
+            return Self::ending_early(early, &found.end);
+        }
+        let range = found.upper[YAW_RATE] - found.lower[YAW_RATE];
+        let maxima = maxima_of_turns(&found.turns[YAW_RATE], range);
+        let period = period_of_maxima(&maxima, range, TOLERANCE);
+        let largest = largest_of(found, &maxima, timing.observed_s);
+        let exponent = largest.filter(|_| period != Period::Equilibrium);
+        let (residual, cycle_s) = match period {
+            Period::Periodic {
+                residual, time_s, ..
+            } => (Some(residual), Some(time_s)),
+            Period::Aperiodic { residual } => (Some(residual), None),
+            Period::Equilibrium | Period::TooShort { .. } => (None, None),
+        };
+        let in_cycle = period.maxima().unwrap_or(maxima.len());
+        let mut heights: Vec<f64> = maxima.iter().take(in_cycle).map(|m| m.1).collect();
+        heights.sort_by(|a, b| b.total_cmp(a));
+        Self {
+            kind: kind(period, exponent, K > 0, &maxima),
+            residual,
+            cycle_s,
+            exponent_per_s: exponent.map(|e| e.per_s),
+            exponent_threshold_per_s: exponent.map(|e| e.threshold_per_s()),
+            maxima_rad_per_s: heights,
+            lower: found.lower,
+            upper: found.upper,
+            end: found.end.x.into(),
+            diverges_at_s: None,
+        }
+    }
+
+    /// The side of the steering angle on which it lies.
+    pub fn lobe(&self) -> &'static str {
+        match (self.lower[STEERING_ANGLE], self.upper[STEERING_ANGLE]) {
+            (low, _) if low > 0.0 => "positive",
+            (_, high) if high < 0.0 => "negative",
+            _ => "both",
+        }
+    }
+
+    /// Least and greatest yaw rate, rad/s.
+    pub fn yaw_rates_rad_per_s(&self) -> (f64, f64) {
+        (self.lower[YAW_RATE], self.upper[YAW_RATE])
+    }
+
+    /// The two are the same attractor: of the same kind, and at rest within 1e-4 of each other or in the stick band of the
+    /// same of the `equilibria`; in motion with extents in every component that have 97 % in common, 80 % without a period.
+    /// Ensemble that diverge are the same, and those that could not be followed for the same reason.
+    pub fn is_same(&self, other: &Self, equilibria: &[Equilibrium]) -> bool {
+        if self.kind != other.kind {
+            return false;
+        }
+        let common = match self.kind {
+            Kind::Diverges | Kind::NotFollowed(_) => return true,
+            Kind::Equilibrium => {
+                let apart = self.end.iter().zip(&other.end).map(|(a, b)| (a - b).abs());
+                let both = |e: &Equilibrium| e.holds(&self.end) && e.holds(&other.end);
+                return apart.fold(0.0, f64::max) < SAME_REST || equilibria.iter().any(both);
+            }
+            Kind::Periodic(_) => COMMON_PERIODIC,
+            Kind::Chaos | Kind::BandedChaos(_) | Kind::Undecided => COMMON_CHAOTIC,
+        };
+        (0..4).all(|k| {
+            let joint = self.upper[k].max(other.upper[k]) - self.lower[k].min(other.lower[k]);
+            let shared = self.upper[k].min(other.upper[k]) - self.lower[k].max(other.lower[k]);
+            shared >= common * joint
+        })
+    }
+}
+
+/// Follows the scenarios' motions through their transients and says what they end on. Results are in the scenarios' order;
+/// motions that were not begun have none.
+///
+/// The period is that of the yaw rate's maxima over the time observed, to 0.2 % of its range. If `with_exponent`, the
+/// largest Lyapunov exponent has to agree, positive only where there is no period; else a motion without period stays
+/// undecided, and one with period is taken as such.
+///
+/// # Errors
+/// If a scenario is not valid.
+pub fn attractors(
+    scenarios: &[Scenario<f64>],
+    timing: Timing,
+    with_exponent: bool,
+    control: RunControl,
+) -> Result<Vec<Option<Attractor>>, InvalidScenario> {
+    let observables = Observables {
+        turns: [true; 4],
+        section: None,
+    };
+    if with_exponent {
+        let see = |_: &_, found: &Trajectory<1>| Attractor::of(found, timing);
+        observe(scenarios, timing, observables, control, see)
+    } else {
+        let see = |_: &_, found: &Trajectory<0>| Attractor::of(found, timing);
+        observe(scenarios, timing, observables, control, see)
+    }
+}
+
+/// What the motion of one scenario ends on; as [`attractors`].
+///
+/// # Errors
+/// If the scenario is not valid.
+pub fn attractor(
+    scenario: &Scenario<f64>,
+    timing: Timing,
+    with_exponent: bool,
+) -> Result<Attractor, InvalidScenario> {
+    let one = std::slice::from_ref(scenario);
+    let mut found = attractors(one, timing, with_exponent, RunControl::none())?;
+    Ok(found.pop().flatten().expect("nobody stops it"))
+}
+
+/// Maxima and exponent must agree.
+pub(crate) fn kind(
+    period: Period,
+    exponent: Option<Exponent>,
+    with_exponent: bool,
+    maxima: &[(f64, f64)],
+) -> Kind {
+    let positive = exponent.map(|e| e.is_positive());
+    match period {
+        Period::Equilibrium => Kind::Equilibrium,
+        Period::Periodic { maxima, .. } if positive == Some(false) || !with_exponent => {
+            Kind::Periodic(maxima)
+        }
+        Period::Aperiodic { .. } if positive == Some(true) => match bands(maxima) {
+            1 => Kind::Chaos,
+            bands => Kind::BandedChaos(bands),
+        },
+        _ => Kind::Undecided,
+    }
+}
+
+/// The greatest number of bands, up to six, that the maxima visit in turn without any two of them meeting.
+fn bands(maxima: &[(f64, f64)]) -> usize {
+    let apart = |n: usize| {
+        let band = |k: usize| {
+            let heights = maxima.iter().skip(k).step_by(n).map(|m| m.1);
+            let empty = (f64::INFINITY, f64::NEG_INFINITY);
+            heights.fold(empty, |(low, high), h| (h.min(low), h.max(high)))
+        };
+        let mut bands: Vec<_> = (0..n).map(band).collect();
+        bands.sort_by(|a, b| a.0.total_cmp(&b.0));
+        bands.windows(2).all(|pair| pair[0].1 < pair[1].0)
+    };
+    let most = MAX_BANDS.min(maxima.len() / MAXIMA_PER_BAND);
+    (2..=most).rev().find(|&n| apart(n)).unwrap_or(1)
+}

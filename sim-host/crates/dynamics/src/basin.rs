@@ -1,0 +1,82 @@
+//! Basins of attraction: which start ends on which attractor.
+
+use crate::attractor::{Attractor, Kind, attractors};
+use crate::equilibria;
+use crate::sweep::{RunControl, SweepError, Timing, Values};
+use shared_model::Scenario;
+
+/// One start, and where it ends.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Cell {
+    /// Sideslip angle at the start, rad.
+    pub sideslip_rad: f64,
+    /// Steering angle at the start, rad.
+    pub steering_angle_rad: f64,
+    /// Index of the attractor.
+    pub attractor: usize,
+}
+
+/// Which start ends where.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Basin {
+    /// The attractors, in the order in which the starts meet them; motions that diverge count as one.
+    pub attractors: Vec<Attractor>,
+    /// The starts, by steering angle within sideslip angle; those not begun are left out.
+    pub cells: Vec<Cell>,
+}
+
+/// Follows the motion from each start of the grid; yaw rate and steering rate start as in the scenario.
+///
+/// Ensemble are told apart by kind and extent ([`Attractor::is_same`]); the first on each attractor without period has its
+/// exponent worked out, which tells chaos from a transient that outlasts the run. Time grows with the number of starts
+/// times the length of a run; starts that diverge end early.
+///
+/// # Errors
+/// If a start's scenario is not valid.
+pub fn basin(
+    scenario: &Scenario<f64>,
+    sideslips_rad: &Values,
+    steering_angles_rad: &Values,
+    timing: Timing,
+    control: RunControl,
+) -> Result<Basin, SweepError> {
+    let at = |beta, delta| {
+        let mut scenario = *scenario;
+        scenario.run.sideslip_rad = beta;
+        scenario.run.steering_angle_rad = delta;
+        scenario.validate().map(|()| scenario)
+    };
+    let row = |beta| steering_angles_rad.iter().map(move |delta| at(beta, delta));
+    let starts = sideslips_rad
+        .iter()
+        .flat_map(row)
+        .collect::<Result<Vec<_>, _>>()?;
+    let ends = attractors(&starts, timing, false, control)?;
+    let equilibria = equilibria::find(scenario)?;
+    let mut found: Vec<(usize, Attractor)> = Vec::new();
+    let mut cells = Vec::new();
+    for (k, (start, end)) in starts.iter().zip(ends).enumerate() {
+        let Some(end) = end else { continue };
+        let known = found.iter().position(|(_, a)| a.is_same(&end, &equilibria));
+        let attractor = known.unwrap_or(found.len());
+        if known.is_none() {
+            found.push((k, end));
+        }
+        cells.push(Cell {
+            sideslip_rad: start.run.sideslip_rad,
+            steering_angle_rad: start.run.steering_angle_rad,
+            attractor,
+        });
+    }
+    let unnamed = |(_, end): &&(usize, Attractor)| end.kind == Kind::Undecided;
+    let unnamed: Vec<_> = found.iter().filter(unnamed).map(|f| starts[f.0]).collect();
+    let mut named = attractors(&unnamed, timing, true, RunControl::none())?
+        .into_iter()
+        .flatten();
+    let name = |(_, end): (usize, Attractor)| match end.kind {
+        Kind::Undecided => named.next().expect("nobody stops it"),
+        _ => end,
+    };
+    let attractors = found.into_iter().map(name).collect();
+    Ok(Basin { attractors, cells })
+}

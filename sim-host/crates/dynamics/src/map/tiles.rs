@@ -1,0 +1,344 @@
+//! The tiles of a map, each in a file that is complete or not there.
+//!
+//! A tile's file is a line with the CRC-32 of all below it, a line of JSON with the tile's number and the whole plan, and the rows
+//! of its cells as CSV. What one run leaves, another continues from; what several machines make is put together. A file with one
+//! byte changed is refused, and so is a plan or a cell that is none, whatever its check sum: no count of a plan is believed
+//! before the plan is checked.
+
+use super::cell::{Cell, InvalidCell, cells};
+use super::plan::{CELLS_A_TILE, Place, Plan, PlanError};
+use crate::sweep::RunControl;
+use files::input;
+use files::output::{WriteError, make_folder, write_text};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Missing tiles that a message names.
+const NAMED: usize = 10;
+/// What the first line says before the check sum.
+const CHECKSUM_KEY: &str = "crc32 ";
+const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+/// Longest file of a tile, bytes: longest plan, and rows of the longest numbers.
+const MOST_BYTES: u64 = 64 * 1024 + 512 * CELLS_A_TILE as u64;
+
+/// Tiles cannot be made, kept or put together.
+#[derive(Debug, thiserror::Error)]
+pub enum TilesError {
+    /// The folder cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// The reason.
+        source: std::io::Error,
+    },
+    /// The folder holds tiles of another plan.
+    #[error(
+        "{} holds tiles of another map: {differences}; give another --work, or delete them",
+        path.display()
+    )]
+    OtherMap {
+        /// The folder.
+        path: PathBuf,
+        /// The parameters that differ.
+        differences: String,
+    },
+    /// A tile's file cannot be used.
+    #[error("cannot use {}; delete it to make it anew", path.display())]
+    Unusable {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: InvalidTile,
+    },
+    /// A tile cannot be computed.
+    #[error(transparent)]
+    Unsupported(#[from] engine::taylor::Unsupported),
+    /// A tile cannot be written.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+    /// The folder has no tiles.
+    #[error("{} has no tiles", .0.display())]
+    NoTiles(PathBuf),
+    /// Tiles are missing.
+    #[error("{missing} of {tiles} tiles are missing: {first}")]
+    Missing {
+        /// How many.
+        missing: usize,
+        /// Tiles of the map.
+        tiles: usize,
+        /// The first of them.
+        first: String,
+    },
+}
+
+/// A file is no tile.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "each message is its description")]
+pub enum InvalidTile {
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    #[error("it has no check sum")]
+    NoChecksum,
+    #[error(
+        "its check sum does not fit: it was changed by hand, damaged, or made by another version"
+    )]
+    Checksum,
+    #[error("it has no rows")]
+    NoRows,
+    #[error(transparent)]
+    Header(#[from] serde_json::Error),
+    #[error("its plan is none")]
+    Plan(#[from] PlanError),
+    #[error("it is tile {tile} of {tiles}")]
+    Number { tile: usize, tiles: usize },
+    #[error(transparent)]
+    Rows(#[from] csv::Error),
+    #[error(transparent)]
+    Cell(#[from] InvalidCell),
+    #[error("its cells are not complete")]
+    Incomplete,
+    #[error("it is of another map: {0}")]
+    OtherMap(String),
+    #[error("it is tile {0}")]
+    OtherTile(usize),
+}
+
+/// Every `of`-th tile of a map: what one of several machines makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    index: usize,
+    of: usize,
+}
+
+impl Shard {
+    /// All tiles.
+    pub const ALL: Self = Self { index: 1, of: 1 };
+
+    fn holds(self, tile: usize) -> bool {
+        tile % self.of == self.index - 1
+    }
+}
+
+impl std::str::FromStr for Shard {
+    type Err = String;
+
+    /// From `i/n`: the `i`-th of `n` shards, counted from 1.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/');
+        let numbers = numbers.map(|(index, of)| (index.parse::<usize>(), of.parse::<usize>()));
+        match numbers {
+            Some((Ok(index), Ok(of))) if (1..=of).contains(&index) => Ok(Self { index, of }),
+            _ => Err("must be i/n with i from 1 to n, for instance 2/4".into()),
+        }
+    }
+}
+
+#[derive(Serialize, Deserialize)]
+struct Header {
+    tile: usize,
+    plan: Plan,
+}
+
+/// A folder with tiles of one plan.
+#[derive(Debug)]
+pub struct Folder<'a> {
+    path: PathBuf,
+    plan: &'a Plan,
+}
+
+impl<'a> Folder<'a> {
+    /// Opens a folder for the tiles of a plan, and makes it if it is not there.
+    ///
+    /// # Errors
+    /// If it cannot be made, or holds a tile of another plan.
+    pub fn make(path: &Path, plan: &'a Plan) -> Result<Self, TilesError> {
+        make_folder(path)?;
+        Self::open(path, plan)
+    }
+
+    /// Opens a folder with tiles of a plan.
+    ///
+    /// # Errors
+    /// If it is not there, or holds a tile of another plan.
+    pub fn open(path: &Path, plan: &'a Plan) -> Result<Self, TilesError> {
+        let folder = Self {
+            path: path.into(),
+            plan,
+        };
+        if let Some(other) = first_tile(path)? {
+            let plan = read(&other)?.0.plan;
+            if plan != *folder.plan {
+                return Err(TilesError::OtherMap {
+                    path: path.into(),
+                    differences: plan.differences(folder.plan).join(", "),
+                });
+            }
+        }
+        Ok(folder)
+    }
+
+    /// Computes the tiles of a shard that are not there yet, several at once, and keeps each as soon as it is done. Those not begun
+    /// when it is asked to stop are left out.
+    ///
+    /// # Errors
+    /// If a tile cannot be computed or written.
+    pub fn fill(&self, shard: Shard, control: RunControl) -> Result<(), TilesError> {
+        let make = |&tile: &usize| self.write(tile, &cells(self.plan, &self.plan.places(tile))?);
+        let made = control.points(&self.missing(shard), make);
+        made.into_iter().flatten().collect()
+    }
+
+    /// Tiles of a shard that are not there.
+    pub fn missing(&self, shard: Shard) -> Vec<usize> {
+        let tiles = (0..self.plan.tiles()).filter(|&tile| shard.holds(tile));
+        tiles.filter(|&tile| !self.file(tile).exists()).collect()
+    }
+
+    fn file(&self, tile: usize) -> PathBuf {
+        self.path.join(format!("tile-{tile:06}.csv"))
+    }
+
+    fn write(&self, tile: usize, cells: &[Cell]) -> Result<(), TilesError> {
+        let text = text(tile, self.plan, cells);
+        Ok(write_text(&self.file(tile), &text, true)?)
+    }
+
+    fn read(&self, tile: usize) -> Result<Vec<Cell>, TilesError> {
+        let file = self.file(tile);
+        let (header, cells) = read(&file)?;
+        let own = if header.plan != *self.plan {
+            let differences = header.plan.differences(self.plan).join(", ");
+            Err(InvalidTile::OtherMap(differences))
+        } else if header.tile != tile {
+            Err(InvalidTile::OtherTile(header.tile))
+        } else {
+            Ok(cells)
+        };
+        own.map_err(|source| unusable(&file, source))
+    }
+}
+
+fn unusable(file: &Path, source: InvalidTile) -> TilesError {
+    let path = file.into();
+    TilesError::Unusable { path, source }
+}
+
+/// A tile as its file has it.
+#[doc(hidden)]
+pub fn text(tile: usize, plan: &Plan, cells: &[Cell]) -> String {
+    let plan = plan.clone();
+    let header = serde_json::to_string(&Header { tile, plan }).expect("a plan is plain data");
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    for cell in cells {
+        csv.serialize(cell).expect("a cell is a row of plain data");
+    }
+    let rows = csv.into_inner().expect("a vector takes all rows");
+    let rows = String::from_utf8(rows).expect("rows are text");
+    sealed(&format!("{header}\n{rows}"))
+}
+
+/// A text after its check sum.
+fn sealed(text: &str) -> String {
+    format!(
+        "{CHECKSUM_KEY}{:08x}\n{text}",
+        CHECKSUM.checksum(text.as_bytes())
+    )
+}
+
+/// A file with its check sum made right: for those that test what lies behind it.
+#[doc(hidden)]
+pub fn resealed(tile: &str) -> String {
+    sealed(tile.split_once('\n').map_or("", |(_, text)| text))
+}
+
+fn read(file: &Path) -> Result<(Header, Vec<Cell>), TilesError> {
+    let text = input::read_text(file, MOST_BYTES).map_err(InvalidTile::Io);
+    let tile = text.and_then(|text| parse(&text));
+    tile.map_err(|source| unusable(file, source))
+}
+
+/// The plan and the cells in a tile's text.
+///
+/// # Errors
+/// If it is none, a byte of it was changed, or its plan or a cell is none.
+#[doc(hidden)]
+pub fn parsed(tile: &str) -> Result<(Plan, Vec<Cell>), InvalidTile> {
+    parse(tile).map(|(header, cells)| (header.plan, cells))
+}
+
+fn parse(tile: &str) -> Result<(Header, Vec<Cell>), InvalidTile> {
+    let (_, text) = tile.split_once('\n').ok_or(InvalidTile::NoChecksum)?;
+    if tile != sealed(text) {
+        return Err(InvalidTile::Checksum);
+    }
+    let (header, rows) = text.split_once('\n').ok_or(InvalidTile::NoRows)?;
+    let header: Header = serde_json::from_str(header)?;
+    header.plan.validate()?;
+    let (tile, tiles) = (header.tile, header.plan.tiles());
+    if tile >= tiles {
+        return Err(InvalidTile::Number { tile, tiles });
+    }
+    let mut reader = csv::Reader::from_reader(rows.as_bytes());
+    let cells = reader.deserialize().collect::<Result<Vec<Cell>, _>>()?;
+    cells.iter().try_for_each(Cell::validate)?;
+    let places: Vec<Place> = cells.iter().map(Cell::place).collect();
+    if places != header.plan.places(tile) {
+        return Err(InvalidTile::Incomplete);
+    }
+    Ok((header, cells))
+}
+
+/// The plan of the tiles in a folder.
+///
+/// # Errors
+/// If there is none, or it cannot be read.
+pub fn plan_of(path: &Path) -> Result<Plan, TilesError> {
+    let tile = first_tile(path)?.ok_or_else(|| TilesError::NoTiles(path.into()))?;
+    Ok(read(&tile)?.0.plan)
+}
+
+/// All cells of a map from tiles in one or several folders, in the map's order.
+///
+/// # Errors
+/// If a tile is in none of them, or one is of another plan or damaged.
+pub fn put_together(folders: &[Folder]) -> Result<Vec<Cell>, TilesError> {
+    let Some(plan) = folders.first().map(|folder| folder.plan) else {
+        return Ok(Vec::new());
+    };
+    let holder = |tile| folders.iter().find(|folder| folder.file(tile).exists());
+    let all = 0..plan.tiles();
+    let missing: Vec<_> = all.clone().filter(|&tile| holder(tile).is_none()).collect();
+    if !missing.is_empty() {
+        let named: Vec<_> = missing.iter().take(NAMED).map(usize::to_string).collect();
+        let more = if missing.len() > NAMED { ", ..." } else { "" };
+        return Err(TilesError::Missing {
+            missing: missing.len(),
+            tiles: plan.tiles(),
+            first: named.join(", ") + more,
+        });
+    }
+    let mut cells = Vec::with_capacity(plan.cells());
+    for (tile, folder) in all.filter_map(|tile| Some((tile, holder(tile)?))) {
+        cells.extend(folder.read(tile)?);
+    }
+    Ok(cells)
+}
+
+/// The first tile's file of a folder, by name.
+fn first_tile(path: &Path) -> Result<Option<PathBuf>, TilesError> {
+    let files = fs::read_dir(path).and_then(|entries| {
+        let paths = entries.map(|entry| Ok(entry?.path()));
+        paths.collect::<std::io::Result<Vec<_>>>()
+    });
+    let files = files.map_err(|source| TilesError::Folder {
+        path: path.into(),
+        source,
+    })?;
+    let is_tile = |file: &PathBuf| {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("tile-") && name.ends_with(".csv")
+    };
+    Ok(files.into_iter().filter(is_tile).min())
+}

@@ -1,0 +1,175 @@
+//! Regions of a parameter in which the motion is of one kind, and their edges.
+
+use crate::attractor::{Attractor, Kind, attractors};
+use crate::equilibria;
+use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
+use shared_model::Scenario;
+
+/// The motion at one value of the parameter.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Sample {
+    /// The parameter's value.
+    pub value: f64,
+    /// What the motion ends on.
+    pub attractor: Attractor,
+}
+
+/// A change of kind, located to an interval.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Edge {
+    /// The lower end of the interval, where the motion is of the kind `below`.
+    pub lower: f64,
+    /// Its upper end, where it is of the kind `above`.
+    pub upper: f64,
+    /// Kind at the lower end.
+    pub below: Kind,
+    /// Kind at the upper end.
+    pub above: Kind,
+}
+
+impl Edge {
+    /// Chaos in one band begins or ends here: some above and none below, or the other way round.
+    pub fn is_of_chaos(&self, begins: bool) -> bool {
+        let (from, to) = if begins {
+            (self.below, self.above)
+        } else {
+            (self.above, self.below)
+        };
+        from != Kind::Chaos && to == Kind::Chaos
+    }
+
+    /// The middle of the interval.
+    pub fn middle(&self) -> f64 {
+        0.5 * (self.lower + self.upper)
+    }
+
+    /// There is a number between its ends.
+    fn can_be_halved(&self) -> bool {
+        self.lower < self.middle() && self.middle() < self.upper
+    }
+}
+
+/// A stretch of the parameter with one kind of motion at all values looked at.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Region {
+    /// Its lower end: the middle of an edge, or the end of the sweep.
+    pub from: f64,
+    /// Its upper end.
+    pub to: f64,
+    /// The kind of motion.
+    pub kind: Kind,
+}
+
+/// A sweep from one start.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Regions {
+    /// The values looked at, those of the bisections included, ascending.
+    pub samples: Vec<Sample>,
+    /// The edges found, ascending.
+    pub edges: Vec<Edge>,
+    /// The regions between them.
+    pub regions: Vec<Region>,
+    /// Every value was looked at, and every edge bisected to the width asked for.
+    pub complete: bool,
+}
+
+/// Classifies the motion from the scenario's start at each of the values, and bisects between neighbours of unlike kind
+/// until the edge is in an interval no wider than `width`.
+///
+/// All edges are halved side by side. Where the kind in the middle is neither of the two, both halves have an edge, so
+/// cascades unfold. Windows narrower than the step of the sweep between values of the same kind are not seen. Time grows with
+/// the number of values, plus log2(step/width) for each edge, times the length of a run.
+///
+/// # Errors
+/// If a value's scenario is not valid.
+pub fn regions(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    values: &Values,
+    width: f64,
+    timing: Timing,
+    control: RunControl,
+) -> Result<Regions, SweepError> {
+    let mut level = scenarios(scenario, parameter, values)?;
+    let mut samples: Vec<Sample> = Vec::new();
+    let mut complete = true;
+    while complete && !level.is_empty() {
+        let found = attractors(&level, timing, true, control)?;
+        complete = found.iter().all(Option::is_some);
+        let sampled = level.iter().zip(found).filter_map(|(scenario, attractor)| {
+            let value = parameter.of(scenario);
+            attractor.map(|attractor| Sample { value, attractor })
+        });
+        samples.extend(sampled);
+        samples.sort_by(|a, b| a.value.total_cmp(&b.value));
+        let wide = edges(&samples)
+            .into_iter()
+            .filter(|edge| edge.upper - edge.lower > width && edge.can_be_halved());
+        level = wide
+            .map(|edge| parameter.set(scenario, edge.middle()))
+            .collect();
+    }
+    let edges = edges(&samples);
+    Ok(Regions {
+        regions: stretches(&samples, &edges),
+        samples,
+        edges,
+        complete,
+    })
+}
+
+fn edges(samples: &[Sample]) -> Vec<Edge> {
+    let unlike = |pair: &[Sample]| {
+        let edge = Edge {
+            lower: pair[0].value,
+            upper: pair[1].value,
+            below: pair[0].attractor.kind,
+            above: pair[1].attractor.kind,
+        };
+        (edge.below != edge.above).then_some(edge)
+    };
+    samples.windows(2).filter_map(unlike).collect()
+}
+
+fn stretches(samples: &[Sample], edges: &[Edge]) -> Vec<Region> {
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+        return Vec::new();
+    };
+    let froms = std::iter::once(first.value).chain(edges.iter().map(Edge::middle));
+    let tos = edges
+        .iter()
+        .map(Edge::middle)
+        .chain(std::iter::once(last.value));
+    let kinds = std::iter::once(first.attractor.kind).chain(edges.iter().map(|e| e.above));
+    let stretch = |((from, to), kind)| Region { from, to, kind };
+    froms.zip(tos).zip(kinds).map(stretch).collect()
+}
+
+/// The values looked at in both sweeps at which they end on attractors that differ, ascending.
+///
+/// # Errors
+/// If a value's scenario is not valid.
+pub fn coexisting(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    one: &Regions,
+    other: &Regions,
+) -> Result<Vec<f64>, SweepError> {
+    let mut values = Vec::new();
+    for sample in &one.samples {
+        let value = sample.value;
+        let same_value = |s: &Sample| s.value.total_cmp(&value);
+        let Ok(k) = other.samples.binary_search_by(same_value) else {
+            continue;
+        };
+        let equilibria = match sample.attractor.kind {
+            Kind::Equilibrium => equilibria::find(&parameter.set(scenario, value))?,
+            _ => Vec::new(),
+        };
+        let met = &other.samples[k].attractor;
+        if !sample.attractor.is_same(met, &equilibria) {
+            values.push(value);
+        }
+    }
+    Ok(values)
+}

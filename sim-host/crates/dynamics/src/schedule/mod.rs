@@ -1,0 +1,126 @@
+//! The dither's schedule: at each wheel speed N the least amplitude W that gives period one, with a margin.
+//!
+//! | question | module |
+//! |---|---|
+//! | which kind of motion has each N and W? | [`cells`] |
+//! | which of that does a map know already? | [`from_map`] |
+//! | which W for which N? | [`choose`] |
+//! | does it hold under the true dither signal? | [`check`] |
+//! | how does the ECU get it? | [`source`] |
+//! | how is it drawn? | [`figure`] |
+
+pub mod cells;
+pub mod check;
+pub mod choose;
+pub mod figure;
+pub mod from_map;
+pub mod source;
+
+use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
+use cells::{Cell, Column, columns};
+use check::check;
+use choose::{Choice, Entry, choose};
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use shared_model::servo::Pwm;
+
+/// What a schedule is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct Plan {
+    /// The wheel speeds of the table, rpm.
+    pub speeds_rpm: Values,
+    /// The amplitudes looked at, V; the first must be 0.
+    pub amplitudes_v: Values,
+    /// Width to which the edges of the ranges of W are bisected, V.
+    pub edge_width_v: f64,
+    /// Share of its range by which an amplitude lies above the least one: 0 to 1.
+    pub margin: f64,
+    /// Times of each run.
+    pub timing: Timing,
+}
+
+/// The schedule of one waveform, with what it comes from.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Analysis {
+    /// The waveform.
+    pub waveform: Waveform,
+    /// Width to which edges were bisected, V: a range of W ends within this beyond the ends given.
+    pub edge_width_v: f64,
+    /// Least room on both sides of an amplitude in its range, V: half a count of the PWM.
+    pub room_v: f64,
+    /// Kinds of motion over W at each wheel speed.
+    pub columns: Vec<Column>,
+    /// The table's entries.
+    pub entries: Vec<Entry>,
+    /// What the table's amplitudes do as the true signal, at its speeds and midway between them.
+    pub checks: Vec<Cell>,
+}
+
+impl Analysis {
+    /// The table's amplitudes, V.
+    pub fn amplitudes_v(&self) -> Vec<f64> {
+        self.entries.iter().map(|entry| entry.amplitude_v).collect()
+    }
+
+    /// Speeds at which no amplitude calms the motion, rpm.
+    pub fn hopeless_rpm(&self) -> Vec<f64> {
+        let hopeless = self.entries.iter().filter(|e| e.choice == Choice::Nothing);
+        hopeless.map(|entry| entry.wheel_speed_rpm).collect()
+    }
+
+    /// Checks that a motion of another kind than period one and rest fails.
+    pub fn failed_checks(&self) -> impl Iterator<Item = &Cell> {
+        self.checks.iter().filter(|cell| !cell.class().is_calm())
+    }
+}
+
+impl Plan {
+    /// Checks that the scenario can be run at every speed and at every amplitude of the plan.
+    ///
+    /// # Errors
+    /// If it cannot, or has no waveform.
+    pub fn validate(&self, scenario: &Scenario<f64>) -> Result<(), SweepError> {
+        scenarios(scenario, Parameter::Amplitude, &self.amplitudes_v)?;
+        scenarios(scenario, Parameter::Speed, &self.speeds_rpm)?;
+        Ok(())
+    }
+}
+
+/// How many runs [`schedule`] makes at least; bisections come on top.
+pub fn runs(plan: &Plan) -> usize {
+    2 * plan.speeds_rpm.count() * (plan.amplitudes_v.count() + 2)
+}
+
+/// Makes the schedule of the scenario's waveform: map, choice, check.
+///
+/// The map takes the mean of the dither. A range of W narrower than the step between amplitudes can be missed, but none is
+/// used that is narrower than a count of the PWM. The result does not depend on the number of threads. The cells of the plan's
+/// grid are run, unless [`from_map::first_cells`] gives them as `first`. `None` if it was stopped.
+///
+/// # Errors
+/// If the scenario has no waveform, or one of a speed and amplitude is not valid.
+pub fn schedule(
+    scenario: &Scenario<f64>,
+    plan: &Plan,
+    first: Option<Vec<Cell>>,
+    control: RunControl,
+) -> Result<Option<Analysis>, SweepError> {
+    plan.validate(scenario)?;
+    let Some(columns) = columns(scenario, plan, first, control)? else {
+        return Ok(None);
+    };
+    let count_v = Pwm::new(&scenario.servo, scenario.run.pwm_rate_hz).volts_per_count();
+    let room_v = (0.5 * count_v).max(choose::RESOLUTION_V);
+    let entries = choose(&columns, plan.margin, room_v);
+    let Some(checks) = check(scenario, &plan.speeds_rpm, &entries, plan.timing, control)? else {
+        return Ok(None);
+    };
+    Ok(Some(Analysis {
+        waveform: scenario.dither.waveform,
+        edge_width_v: plan.edge_width_v,
+        room_v,
+        columns,
+        entries,
+        checks,
+    }))
+}

@@ -1,0 +1,196 @@
+//! The ECU that a drive has at its other end, wherever it runs.
+
+use qemu::session::Session;
+use qemu::{Finished, RunError};
+use shared_model::controller::{Command, Controller};
+use shared_model::dither::Oscillator;
+use shared_model::e2e::Sender;
+use shared_model::exchange::{FrameBytes, Packet, ToEcu};
+use shared_model::frame::{ACTUATOR_DATA_ID, decode_measurement, encode_actuation};
+use shared_model::gate::{Limiter, Observation, Setpoint, Supervisor};
+use shared_model::servo::Pwm;
+use shared_model::signal::{Actuation, Measurement};
+use shared_model::{InvalidScenario, Real, Scenario, ecu};
+
+/// Counts a second of an ideal clock.
+const CLOCK_HZ: u32 = 25_000_000;
+
+/// An ECU in the loop.
+pub trait Ecu {
+    /// One PWM period: `answer` takes what the ECU put out and gives what its pins brought by the period's end.
+    ///
+    /// # Errors
+    /// If the ECU cannot be reached.
+    fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError>;
+}
+
+fn counts_a_tick<T: Real>(scenario: &Scenario<T>) -> u32 {
+    (f64::from(CLOCK_HZ) / scenario.run.control_rate_hz.to_f64()) as u32
+}
+
+/// Model in the loop: controller and gate called by hand, in one channel and one thread, without the ECU's tasks and without
+/// end-to-end protection of what they are told. The check that tasks, channels and frames change nothing.
+pub struct Model<T> {
+    controller: Controller<T>,
+    supervisor: Supervisor<T>,
+    limiter: Limiter<T>,
+    oscillator: Oscillator,
+    pwm: Pwm<T>,
+    measurement: Option<Measurement<T>>,
+    now: Setpoint<T>,
+    next: Option<(Setpoint<T>, FrameBytes)>,
+    sender: Sender,
+    counts_a_tick: u32,
+    periods_a_tick: u32,
+    periods: u32,
+}
+
+impl<T: Real> Model<T> {
+    /// Controller and gate of a scenario.
+    ///
+    /// # Errors
+    /// If the scenario is not valid.
+    pub fn new(scenario: &Scenario<T>) -> Result<Self, InvalidScenario> {
+        scenario.validate()?;
+        let pwm = Pwm::new(&scenario.servo, scenario.run.pwm_rate_hz);
+        Ok(Self {
+            controller: Controller::new(scenario),
+            supervisor: Supervisor::new(scenario, CLOCK_HZ),
+            limiter: Limiter::new(scenario, pwm.neutral().code()),
+            oscillator: Oscillator::new(&scenario.dither, scenario.run.pwm_rate_hz),
+            pwm,
+            measurement: None,
+            now: Setpoint::neutral(),
+            next: None,
+            sender: Sender::new(ACTUATOR_DATA_ID),
+            counts_a_tick: counts_a_tick(scenario),
+            periods_a_tick: scenario.periods_per_tick(),
+            periods: 0,
+        })
+    }
+
+    fn tick(&mut self, frame: Option<FrameBytes>) -> (Setpoint<T>, FrameBytes) {
+        let new = frame.map(|frame| decode_measurement(&frame).map(&|x| T::from_f64(x.into())));
+        self.measurement = new.or(self.measurement);
+        let none = Command {
+            motor_v: T::zero(),
+            dither_amplitude_v: T::zero(),
+        };
+        let command = self
+            .measurement
+            .map_or(none, |told| self.controller.run(&told));
+        let setpoint = self.supervisor.run(&Observation {
+            elapsed_counts: self.counts_a_tick,
+            measurement: new,
+            motor_v: command.motor_v,
+            dither_amplitude_v: command.dither_amplitude_v,
+            found_outside: self.limiter.faults(),
+        });
+        let actuation = Actuation {
+            mode: self.supervisor.mode(),
+            faults: self.supervisor.faults().bits(),
+            motor_voltage_v: setpoint.motor_v.to_f64() as f32,
+            dither_amplitude_v: setpoint.dither_amplitude_v.to_f64() as f32,
+            wheel_speed_limit_rpm: self.supervisor.wheel_speed_limit_rpm().to_f64() as f32,
+            warnings: 0,
+            sensor_counter: frame.map_or(u8::MAX, |[_, _, counter, ..]| counter),
+        };
+        (setpoint, encode_actuation(&actuation, &mut self.sender))
+    }
+}
+
+impl<T: Real> Ecu for Model<T> {
+    fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
+        self.periods += 1;
+        let is_tick = self.periods.is_multiple_of(self.periods_a_tick);
+        let sample: T = self.oscillator.sample();
+        let dither_v = self.now.dither_amplitude_v * sample;
+        let duty = self.pwm.duty(self.limiter.run(&self.now, dither_v));
+        self.limiter.expect(duty.code());
+        let next = self.next.take_if(|_| is_tick);
+        let reply = answer(&Packet {
+            duty_code: duty.code(),
+            frame: next.map(|(_, frame)| frame),
+        });
+        self.now = next.map_or(self.now, |(setpoint, _)| setpoint);
+        self.limiter.observe(reply.duty_code);
+        if is_tick {
+            self.next = Some(self.tick(reply.frame));
+        }
+        Ok(())
+    }
+}
+
+/// Software in the loop: the ECU's program on the host, in the target's arithmetic.
+pub struct Software {
+    ecu: ecu::Ecu<f32>,
+    counts_a_tick: u32,
+}
+
+impl Software {
+    /// The program of a scenario.
+    ///
+    /// # Errors
+    /// If the scenario is not valid.
+    pub fn new(scenario: &Scenario<f32>) -> Result<Self, InvalidScenario> {
+        Ok(Self {
+            ecu: ecu::Ecu::new(scenario, CLOCK_HZ)?,
+            counts_a_tick: counts_a_tick(scenario),
+        })
+    }
+}
+
+impl Ecu for Software {
+    fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
+        self.ecu.period(answer, || self.counts_a_tick);
+        Ok(())
+    }
+}
+
+/// Processor in the loop: the firmware in the emulator.
+pub struct Processor {
+    session: Session,
+    costs: Vec<(u16, u16)>,
+}
+
+impl Processor {
+    /// The firmware of a session that has just begun.
+    pub fn new(session: Session) -> Self {
+        Self {
+            session,
+            costs: Vec::new(),
+        }
+    }
+
+    /// Counts that the PWM task (at most, in one period) and the control task took, one pair a control tick.
+    pub fn costs(&self) -> &[(u16, u16)] {
+        &self.costs
+    }
+
+    /// Ends the run, the firmware with it.
+    ///
+    /// # Errors
+    /// If it does not end.
+    pub fn finish(mut self) -> Result<Finished, RunError> {
+        let received = self.session.receive()?;
+        self.session.send(&ToEcu {
+            packet: received.packet,
+            stop: true,
+        })?;
+        self.session.finish()
+    }
+}
+
+impl Ecu for Processor {
+    fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
+        let received = self.session.receive()?;
+        if received.packet.frame.is_some() {
+            self.costs.push((received.pwm_cost, received.control_cost));
+        }
+        let packet = answer(&received.packet);
+        self.session.send(&ToEcu {
+            packet,
+            stop: false,
+        })
+    }
+}

@@ -1,0 +1,549 @@
+//! What can be done to the loop, as data.
+
+use dynamics::words::counted;
+use shared_model::gate::Limits;
+use shared_model::signal::Measurement;
+use std::fmt;
+
+/// A signal of the sensor frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Signal {
+    /// Wheel speed, rpm.
+    WheelSpeed,
+    /// Yaw rate, rad/s.
+    YawRate,
+    /// Steering angle, rad.
+    SteeringAngle,
+    /// Steering rate, rad/s.
+    SteeringRate,
+    /// Driver's current request, A.
+    CurrentRequest,
+}
+
+impl Signal {
+    /// All signals.
+    pub const ALL: [Self; 5] = [
+        Self::WheelSpeed,
+        Self::YawRate,
+        Self::SteeringAngle,
+        Self::SteeringRate,
+        Self::CurrentRequest,
+    ];
+
+    /// Its name, for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::WheelSpeed => "wheel speed",
+            Self::YawRate => "yaw rate",
+            Self::SteeringAngle => "steering angle",
+            Self::SteeringRate => "steering rate",
+            Self::CurrentRequest => "current request",
+        }
+    }
+
+    /// Its place in a measurement.
+    pub fn of(self, measurement: &mut Measurement<f32>) -> &mut f32 {
+        match self {
+            Self::WheelSpeed => &mut measurement.wheel_speed_rpm,
+            Self::YawRate => &mut measurement.yaw_rate_rad_per_s,
+            Self::SteeringAngle => &mut measurement.steering_angle_rad,
+            Self::SteeringRate => &mut measurement.steering_rate_rad_per_s,
+            Self::CurrentRequest => &mut measurement.current_request_a,
+        }
+    }
+
+    /// Greatest magnitude that the gate lets through, in its unit.
+    pub fn range(self, limits: &Limits<f64>) -> f64 {
+        match self {
+            Self::WheelSpeed => limits.wheel_speed_rpm,
+            Self::YawRate => limits.yaw_rate_rad_per_s,
+            Self::SteeringAngle => limits.steering_angle_rad,
+            Self::SteeringRate => limits.steering_rate_rad_per_s,
+            Self::CurrentRequest => limits.current_request_a,
+        }
+    }
+}
+
+/// How one sensor fails. Shares are of the signal's range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SensorFailure {
+    /// Not a number.
+    NotANumber,
+    /// Infinite.
+    Infinite,
+    /// A subnormal number.
+    Subnormal,
+    /// One and a half times its range.
+    OutOfRange,
+    /// Keeps its last value.
+    Stuck,
+    /// Jumps by this share and keeps that value.
+    Step(f32),
+    /// Is off by this share.
+    Offset(f32),
+    /// Is off by ever more: this share a second.
+    Drift(f32),
+    /// Zero.
+    DropOut,
+}
+
+/// How a link fails, for as many frames as the fault lasts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LinkFailure {
+    /// This bit is flipped.
+    Corruption {
+        /// Number of the bit.
+        bit: u16,
+    },
+    /// The last frame before the fault comes again.
+    Repetition,
+    /// No frame comes.
+    Loss,
+    /// Frames come this many control ticks late.
+    Delay {
+        /// Control ticks.
+        ticks: usize,
+    },
+    /// An old frame comes in place of the new one.
+    Insertion {
+        /// Its age, control ticks.
+        age_ticks: usize,
+    },
+    /// Another sender's frame comes: whole, but with another data ID.
+    Masquerade,
+    /// Whole frames whose counter is ahead by this.
+    WrongSequence {
+        /// Counts.
+        ahead: u8,
+    },
+}
+
+/// How the servo fails.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ServoFailure {
+    /// The duty stays as it is.
+    Stuck,
+    /// The duty is at an end of its range.
+    Saturated {
+        /// The upper one.
+        high: bool,
+    },
+    /// The dither comes this many PWM periods late.
+    DitherPhase {
+        /// PWM periods.
+        periods: usize,
+    },
+    /// The dither is inverted.
+    DitherInverted,
+    /// The dither is held over this many PWM periods: another frequency.
+    DitherFrequency {
+        /// PWM periods.
+        held: u32,
+    },
+    /// The duty is off by these counts.
+    Offset {
+        /// Counts.
+        counts: i16,
+    },
+}
+
+/// How the ECU's interrupts or its clock fail.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TimingFailure {
+    /// This many PWM interrupts in a row do not come.
+    MissedPwm(u32),
+    /// This many PWM interrupts in a row come twice.
+    DoublePwm(u32),
+    /// The control interrupt does not come.
+    MissedControl,
+    /// The control interrupt comes twice.
+    DoubleControl,
+    /// The control task is done this many PWM periods late.
+    Overrun(u32),
+    /// The independent clock runs at this ratio.
+    Clock(f64),
+    /// The processor starts again.
+    Reset,
+}
+
+/// What is done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// A sensor fails.
+    Sensor(Signal, SensorFailure),
+    /// Two signals are exchanged.
+    Swapped(Signal, Signal),
+    /// The link to the ECU fails.
+    SensorLink(LinkFailure),
+    /// The link to the vehicle fails.
+    ActuatorLink(LinkFailure),
+    /// The servo fails, and its pin shows it.
+    Servo(ServoFailure),
+    /// The servo fails behind the pin that is read back.
+    ServoBehindReadback(ServoFailure),
+    /// Interrupts or clock fail.
+    Timing(TimingFailure),
+}
+
+impl Kind {
+    /// Its name without what it is done to and how much.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sensor(_, failure) => failure.name(),
+            Self::Swapped(..) => "sensors swapped",
+            Self::SensorLink(failure) => failure.name(),
+            Self::ActuatorLink(failure) => match failure {
+                LinkFailure::Corruption { .. } => "actuator frame corrupted",
+                LinkFailure::Repetition => "actuator frame repeated",
+                LinkFailure::Loss => "actuator frame lost",
+                LinkFailure::Delay { .. } => "actuator frame late",
+                LinkFailure::Insertion { .. } => "actuator frame inserted",
+                LinkFailure::Masquerade => "actuator frame masqueraded",
+                LinkFailure::WrongSequence { .. } => "actuator frame out of sequence",
+            },
+            Self::Servo(failure) => failure.name(),
+            Self::ServoBehindReadback(_) => "servo, read back right",
+            Self::Timing(failure) => failure.name(),
+        }
+    }
+}
+
+impl SensorFailure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::NotANumber => "sensor NaN",
+            Self::Infinite => "sensor infinite",
+            Self::Subnormal => "sensor subnormal",
+            Self::OutOfRange => "sensor out of range",
+            Self::Stuck => "sensor stuck",
+            Self::Step(_) => "sensor step",
+            Self::Offset(_) => "sensor offset",
+            Self::Drift(_) => "sensor drift",
+            Self::DropOut => "sensor drop-out",
+        }
+    }
+}
+
+impl LinkFailure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Corruption { .. } => "sensor frame corrupted",
+            Self::Repetition => "sensor frame repeated",
+            Self::Loss => "sensor frame lost",
+            Self::Delay { .. } => "sensor frame late",
+            Self::Insertion { .. } => "sensor frame inserted",
+            Self::Masquerade => "sensor frame masqueraded",
+            Self::WrongSequence { .. } => "sensor frame out of sequence",
+        }
+    }
+}
+
+impl ServoFailure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Stuck => "duty stuck",
+            Self::Saturated { .. } => "duty saturated",
+            Self::DitherPhase { .. } | Self::DitherInverted => "dither phase",
+            Self::DitherFrequency { .. } => "dither frequency",
+            Self::Offset { .. } => "duty offset",
+        }
+    }
+}
+
+impl TimingFailure {
+    fn name(self) -> &'static str {
+        match self {
+            Self::MissedPwm(_) => "PWM interrupt missed",
+            Self::DoublePwm(_) => "PWM interrupt doubled",
+            Self::MissedControl => "control interrupt missed",
+            Self::DoubleControl => "control interrupt doubled",
+            Self::Overrun(_) => "control task late",
+            Self::Clock(_) => "clock",
+            Self::Reset => "reset",
+        }
+    }
+}
+
+/// Class of faults, as the totals are told by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Class {
+    /// What a sensor tells.
+    Sensor,
+    /// Frames on their way.
+    Link,
+    /// Interrupts and clock.
+    Timing,
+    /// Single bits in the ECU's memory.
+    Memory,
+    /// The servo.
+    Actuator,
+    /// The processor itself.
+    Processor,
+}
+
+impl Class {
+    /// All classes.
+    pub const ALL: [Self; 6] = [
+        Self::Sensor,
+        Self::Link,
+        Self::Timing,
+        Self::Memory,
+        Self::Actuator,
+        Self::Processor,
+    ];
+
+    /// Its name, for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Link => "link",
+            Self::Timing => "timing",
+            Self::Memory => "memory",
+            Self::Actuator => "actuator",
+            Self::Processor => "processor",
+        }
+    }
+}
+
+/// A fault and how long it lasts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fault {
+    /// What is done.
+    pub kind: Kind,
+    /// For how many control ticks; `None` for good. Faults of timing last as long as their kind says.
+    pub ticks: Option<u32>,
+}
+
+impl Fault {
+    /// Its class.
+    pub fn class(&self) -> Class {
+        match self.kind {
+            Kind::Sensor(..) | Kind::Swapped(..) => Class::Sensor,
+            Kind::SensorLink(_) | Kind::ActuatorLink(_) => Class::Link,
+            Kind::Servo(_) | Kind::ServoBehindReadback(_) => Class::Actuator,
+            Kind::Timing(TimingFailure::Reset) => Class::Processor,
+            Kind::Timing(_) => Class::Timing,
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.kind {
+            Kind::Sensor(signal, failure) => write!(f, "{}: {failure}", signal.name()),
+            Kind::Swapped(a, b) => write!(f, "{} and {} swapped", a.name(), b.name()),
+            Kind::SensorLink(failure) => write!(f, "sensor frame: {failure}"),
+            Kind::ActuatorLink(failure) => write!(f, "actuator frame: {failure}"),
+            Kind::Servo(failure) => write!(f, "servo: {failure}"),
+            Kind::ServoBehindReadback(failure) => {
+                write!(f, "servo, read back right: {failure}")
+            }
+            Kind::Timing(failure) => write!(f, "{failure}"),
+        }?;
+        match self.ticks {
+            Some(ticks) => write!(f, ", {}", counted(ticks, "tick")),
+            None => Ok(()),
+        }
+    }
+}
+
+impl fmt::Display for SensorFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |share: f32| 100.0 * share;
+        match *self {
+            Self::NotANumber => write!(f, "NaN"),
+            Self::Infinite => write!(f, "infinite"),
+            Self::Subnormal => write!(f, "subnormal"),
+            Self::OutOfRange => write!(f, "out of range"),
+            Self::Stuck => write!(f, "stuck"),
+            Self::Step(share) => write!(f, "step of {:+} %", percent(share)),
+            Self::Offset(share) => write!(f, "offset of {:+} %", percent(share)),
+            Self::Drift(share) => write!(f, "drift of {:+} %/s", percent(share)),
+            Self::DropOut => write!(f, "drop-out"),
+        }
+    }
+}
+
+impl fmt::Display for LinkFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Corruption { bit } => write!(f, "bit {bit} flipped"),
+            Self::Repetition => write!(f, "repeated"),
+            Self::Loss => write!(f, "lost"),
+            Self::Delay { ticks } => write!(f, "late by {ticks}"),
+            Self::Insertion { age_ticks } => write!(f, "one of {} ago", counted(age_ticks, "tick")),
+            Self::Masquerade => write!(f, "of another sender"),
+            Self::WrongSequence { ahead } => write!(f, "counter ahead by {ahead}"),
+        }
+    }
+}
+
+impl fmt::Display for ServoFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Stuck => write!(f, "duty stuck"),
+            Self::Saturated { high: true } => write!(f, "duty at 100 %"),
+            Self::Saturated { high: false } => write!(f, "duty at 0 %"),
+            Self::DitherPhase { periods } => {
+                write!(f, "dither late by {}", counted(periods, "period"))
+            }
+            Self::DitherInverted => write!(f, "dither inverted"),
+            Self::DitherFrequency { held } => {
+                write!(f, "dither held over {}", counted(held, "period"))
+            }
+            Self::Offset { counts } => write!(f, "duty off by {}", counted(counts, "count")),
+        }
+    }
+}
+
+impl fmt::Display for TimingFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::MissedPwm(count) => write!(f, "PWM interrupt missed {}", counted(count, "time")),
+            Self::DoublePwm(count) => write!(f, "PWM interrupt doubled {}", counted(count, "time")),
+            Self::MissedControl => write!(f, "control interrupt missed"),
+            Self::DoubleControl => write!(f, "control interrupt doubled"),
+            Self::Overrun(periods) => write!(f, "control late by {}", counted(periods, "period")),
+            Self::Clock(ratio) => write!(f, "clock at {ratio} of its rate"),
+            Self::Reset => write!(f, "reset"),
+        }
+    }
+}
+
+/// Every fault that is injected between vehicle and ECU and into the ECU's timing.
+pub fn all() -> Vec<Fault> {
+    let mut faults = sensors();
+    faults.extend(links());
+    faults.extend(servo());
+    faults.extend(timing());
+    faults
+}
+
+fn lasting(kind: Kind) -> Fault {
+    Fault { kind, ticks: None }
+}
+
+fn sensors() -> Vec<Fault> {
+    use SensorFailure::{
+        Drift, DropOut, Infinite, NotANumber, Offset, OutOfRange, Step, Stuck, Subnormal,
+    };
+    let mut failures = vec![NotANumber, Infinite, Subnormal, OutOfRange, Stuck, DropOut];
+    for share in [0.005, 0.02, 0.1, 0.5] {
+        for share in [share, -share] {
+            failures.extend([Step(share), Offset(share)]);
+        }
+    }
+    failures.extend([Drift(0.01), Drift(-0.01)]);
+    let mut faults = Vec::new();
+    for signal in Signal::ALL {
+        for failure in &failures {
+            faults.push(lasting(Kind::Sensor(signal, *failure)));
+        }
+        for failure in [NotANumber, DropOut, Offset(0.1)] {
+            let kind = Kind::Sensor(signal, failure);
+            let ticks = Some(1);
+            faults.push(Fault { kind, ticks });
+        }
+    }
+    for (k, a) in Signal::ALL.into_iter().enumerate() {
+        for b in Signal::ALL.into_iter().skip(k + 1) {
+            faults.push(lasting(Kind::Swapped(a, b)));
+        }
+    }
+    faults
+}
+
+fn links() -> Vec<Fault> {
+    use LinkFailure::{Corruption, Delay, Insertion, Loss, Masquerade, Repetition, WrongSequence};
+    let brief = [1, 2, 3].map(Some);
+    let mut faults = Vec::new();
+    let mut add = |failure, ticks: &[Option<u32>]| {
+        for link in [Kind::SensorLink, Kind::ActuatorLink] {
+            let kind = link(failure);
+            faults.extend(ticks.iter().map(|&ticks| Fault { kind, ticks }));
+        }
+    };
+    for bit in [0, 9, 18, 30, 77, 128, 191] {
+        add(Corruption { bit }, &[Some(1)]);
+    }
+    add(Corruption { bit: 77 }, &[None]);
+    add(Repetition, &[Some(1), Some(5), None]);
+    add(Loss, &brief);
+    add(Loss, &[Some(8), Some(12), None]);
+    for ticks in [1, 3, 20] {
+        add(Delay { ticks }, &[None]);
+    }
+    for age_ticks in [2, 50, 256] {
+        add(Insertion { age_ticks }, &[Some(1)]);
+    }
+    add(Masquerade, &[Some(1), None]);
+    for ahead in [3, 100, 255] {
+        add(WrongSequence { ahead }, &[Some(1), None]);
+    }
+    faults
+}
+
+fn servo() -> Vec<Fault> {
+    use ServoFailure::{DitherFrequency, DitherInverted, DitherPhase, Offset, Saturated, Stuck};
+    let failures = [
+        Stuck,
+        Saturated { high: true },
+        Saturated { high: false },
+        DitherPhase { periods: 1 },
+        DitherPhase { periods: 8 },
+        DitherInverted,
+        DitherFrequency { held: 2 },
+        DitherFrequency { held: 5 },
+        Offset { counts: 1 },
+        Offset { counts: -40 },
+    ];
+    let mut faults = Vec::new();
+    for failure in failures {
+        faults.push(lasting(Kind::Servo(failure)));
+        faults.push(lasting(Kind::ServoBehindReadback(failure)));
+    }
+    faults
+}
+
+fn timing() -> Vec<Fault> {
+    use TimingFailure::{
+        Clock, DoubleControl, DoublePwm, MissedControl, MissedPwm, Overrun, Reset,
+    };
+    let failures = [
+        MissedPwm(1),
+        MissedPwm(2),
+        MissedPwm(3),
+        MissedPwm(10),
+        DoublePwm(1),
+        DoublePwm(2),
+        DoublePwm(3),
+        DoublePwm(10),
+        MissedControl,
+        DoubleControl,
+        Overrun(5),
+        Overrun(15),
+        Clock(0.0),
+        Clock(0.5),
+        Clock(0.9),
+        Clock(1.1),
+        Clock(1.5),
+        Reset,
+    ];
+    failures
+        .map(|failure| lasting(Kind::Timing(failure)))
+        .to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn every_fault_has_a_name_of_its_own() {
+        let names: Vec<String> = all().iter().map(ToString::to_string).collect();
+        let distinct: HashSet<&String> = names.iter().collect();
+        assert_eq!(distinct.len(), names.len());
+    }
+}

@@ -1,0 +1,286 @@
+//! The emulator's gdb stub: stops the core, looks into it and changes it, over the remote serial protocol.
+//!
+//! QEMU takes a stopped core for an idle one (seen in 7.2), and idle time is skipped: at each stop the virtual time jumps to the
+//! next timer interrupt, which is then due at once. Data stay what they are, but a run with many stops has less time between
+//! its interrupts; a stop where the core would idle anyway costs nothing. Protocol: the GDB manual, appendix "GDB Remote
+//! Serial Protocol".
+
+use crate::socket::{LONGEST_LINE, Socket, SocketError};
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::time::Duration;
+
+/// In single steps interrupts wait and timers stand: a step past a breakpoint else enters the interrupt that the stop has made
+/// due, and the core comes back to the breakpoint without having passed it.
+const STEP_ALONE: &str = "Qqemu.sstep=7";
+/// Size of a Thumb breakpoint as the protocol has it, bytes.
+const THUMB_BREAKPOINT: u32 = 2;
+
+/// Why the core stands still.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stop {
+    /// At a breakpoint.
+    Breakpoint,
+    /// The program has ended with this exit code, of which the protocol has the low 8 bits, and the emulator with it.
+    Exited(u8),
+}
+
+/// A core register of a Cortex-M.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Register {
+    /// R0 to R12.
+    R(u8),
+    /// Stack pointer.
+    Sp,
+    /// Link register.
+    Lr,
+    /// Program counter.
+    Pc,
+    /// Program status.
+    Xpsr,
+}
+
+impl Register {
+    /// Its number in the protocol. The status is behind eight registers of an older floating-point unit.
+    fn number(self) -> u8 {
+        match self {
+            Self::R(index) => index,
+            Self::Sp => 13,
+            Self::Lr => 14,
+            Self::Pc => 15,
+            Self::Xpsr => 25,
+        }
+    }
+}
+
+/// A connection to the gdb stub.
+#[derive(Debug)]
+pub struct Gdb {
+    socket: Socket,
+    breakpoints: BTreeSet<u32>,
+}
+
+impl Gdb {
+    /// Connects to the stub at the local socket `path`, which may come up only within `limit`; no later request waits longer
+    /// for its answer either. The core stands still from then on.
+    ///
+    /// # Errors
+    /// If there is no stub in time.
+    pub fn connect(path: &Path, limit: Duration) -> Result<Self, SocketError> {
+        let socket = Socket::connect(path, limit)?;
+        let mut gdb = Self {
+            socket,
+            breakpoints: BTreeSet::new(),
+        };
+        // The emulator gives single registers only to those who know their description.
+        let description = gdb.request("qXfer:features:read:target.xml:0,fff")?;
+        if !description.starts_with(['l', 'm']) {
+            return Err(SocketError::NotUnderstood(description));
+        }
+        gdb.acknowledged(STEP_ALONE)?;
+        Ok(gdb)
+    }
+
+    /// Stops the core whenever it is about to execute the instruction at `address`.
+    ///
+    /// # Errors
+    /// If the stub refuses or does not answer.
+    pub fn set_breakpoint(&mut self, address: u32) -> Result<(), SocketError> {
+        self.acknowledged(&format!("Z1,{address:x},{THUMB_BREAKPOINT}"))?;
+        self.breakpoints.insert(address);
+        Ok(())
+    }
+
+    /// Takes a breakpoint away.
+    ///
+    /// # Errors
+    /// If the stub refuses or does not answer.
+    pub fn remove_breakpoint(&mut self, address: u32) -> Result<(), SocketError> {
+        self.acknowledged(&format!("z1,{address:x},{THUMB_BREAKPOINT}"))?;
+        self.breakpoints.remove(&address);
+        Ok(())
+    }
+
+    /// Lets the core go on until it stops by itself, for at most `limit` of the host's time.
+    ///
+    /// # Errors
+    /// If it does not stop in time. It then runs on, and only dropping the emulator ends it.
+    pub fn run_to_stop(&mut self, limit: Duration) -> Result<Stop, SocketError> {
+        let here = self.read_register(Register::Pc)?;
+        // A breakpoint right here would stop the core again at once.
+        if self.breakpoints.contains(&here) {
+            self.remove_breakpoint(here)?;
+            let stop = self.go("s", limit)?;
+            if stop != Stop::Breakpoint {
+                return Ok(stop);
+            }
+            self.set_breakpoint(here)?;
+        }
+        self.go("c", limit)
+    }
+
+    fn go(&mut self, how: &str, limit: Duration) -> Result<Stop, SocketError> {
+        self.send(how)?;
+        let usual = self.socket.limit();
+        self.socket.wait_at_most(limit)?;
+        let answer = self.receive()?;
+        self.socket.wait_at_most(usual)?;
+        let code = answer
+            .get(1..3)
+            .and_then(|c| u8::from_str_radix(c, 16).ok());
+        match (answer.as_bytes().first(), code) {
+            (Some(b'T' | b'S'), Some(_)) => Ok(Stop::Breakpoint),
+            (Some(b'W'), Some(code)) => Ok(Stop::Exited(code)),
+            _ => Err(SocketError::NotUnderstood(answer)),
+        }
+    }
+
+    /// Reads `length` bytes of memory or of a device's registers, as the core sees them.
+    ///
+    /// # Errors
+    /// If nothing is mapped there, or the stub does not answer.
+    pub fn read_memory(&mut self, address: u32, length: usize) -> Result<Vec<u8>, SocketError> {
+        let request = format!("m{address:x},{length:x}");
+        let answer = self.request(&request)?;
+        let bytes = from_hex(&answer).ok_or_else(|| refused(&request, &answer))?;
+        if bytes.len() == length {
+            Ok(bytes)
+        } else {
+            Err(refused(&request, &answer))
+        }
+    }
+
+    /// Writes memory, flash included. The emulator ignores writes to a device's registers.
+    ///
+    /// # Errors
+    /// If nothing is mapped there, or the stub does not answer.
+    pub fn write_memory(&mut self, address: u32, bytes: &[u8]) -> Result<(), SocketError> {
+        self.acknowledged(&format!("M{address:x},{:x}:{}", bytes.len(), to_hex(bytes)))
+    }
+
+    /// Reads a core register.
+    ///
+    /// # Errors
+    /// If there is no such register, or the stub does not answer.
+    pub fn read_register(&mut self, register: Register) -> Result<u32, SocketError> {
+        let request = format!("p{:x}", register.number());
+        let answer = self.request(&request)?;
+        let bytes = from_hex(&answer).and_then(|bytes| bytes.try_into().ok());
+        let bytes = bytes.ok_or_else(|| refused(&request, &answer))?;
+        Ok(u32::from_le_bytes(bytes))
+    }
+
+    /// Writes a core register.
+    ///
+    /// # Errors
+    /// If there is no such register, or the stub does not answer.
+    pub fn write_register(&mut self, register: Register, value: u32) -> Result<(), SocketError> {
+        let value = to_hex(&value.to_le_bytes());
+        self.acknowledged(&format!("P{:x}={value}", register.number()))
+    }
+
+    /// Takes all breakpoints away, lets the core go on and leaves it alone.
+    ///
+    /// # Errors
+    /// If the stub refuses or does not answer.
+    pub fn detach(mut self) -> Result<(), SocketError> {
+        match self.acknowledged("D") {
+            // The core goes on before the stub answers: a program at its end takes the connection with it.
+            Err(SocketError::Lost(_)) => Ok(()),
+            other => other,
+        }
+    }
+
+    fn acknowledged(&mut self, request: &str) -> Result<(), SocketError> {
+        match self.request(request)?.as_str() {
+            "OK" => Ok(()),
+            answer => Err(refused(request, answer)),
+        }
+    }
+
+    fn request(&mut self, request: &str) -> Result<String, SocketError> {
+        self.send(request)?;
+        self.receive()
+    }
+
+    /// Sends a packet and waits until the stub has taken it.
+    fn send(&mut self, content: &str) -> Result<(), SocketError> {
+        let packet = format!("${content}#{:02x}", checksum(content.as_bytes()));
+        self.socket.write(packet.as_bytes())?;
+        match self.socket.read_byte()? {
+            b'+' => Ok(()),
+            other => Err(SocketError::NotUnderstood(char::from(other).into())),
+        }
+    }
+
+    /// Receives a packet and takes it.
+    fn receive(&mut self) -> Result<String, SocketError> {
+        let mut content = Vec::new();
+        let mut is_inside = false;
+        let mut left = LONGEST_LINE;
+        loop {
+            match self.socket.read_byte()? {
+                b'$' if !is_inside => is_inside = true,
+                b'#' if is_inside => break,
+                byte if is_inside => content.push(byte),
+                _ => {}
+            }
+            left -= 1;
+            if left == 0 {
+                return Err(SocketError::NotUnderstood("a packet without end".into()));
+            }
+        }
+        let digits = [self.socket.read_byte()?, self.socket.read_byte()?];
+        let text = String::from_utf8_lossy(&content).into_owned();
+        if from_hex(&String::from_utf8_lossy(&digits)) != Some(vec![checksum(&content)]) {
+            return Err(SocketError::NotUnderstood(text));
+        }
+        self.socket.write(b"+")?;
+        Ok(text)
+    }
+}
+
+fn refused(request: &str, answer: &str) -> SocketError {
+    SocketError::Refused {
+        request: request.into(),
+        answer: answer.into(),
+    }
+}
+
+fn checksum(bytes: &[u8]) -> u8 {
+    bytes.iter().fold(0, |sum, byte| sum.wrapping_add(*byte))
+}
+
+fn to_hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn from_hex(text: &str) -> Option<Vec<u8>> {
+    if !text.len().is_multiple_of(2) {
+        return None;
+    }
+    let pairs = (0..text.len()).step_by(2).map(|i| text.get(i..i + 2));
+    pairs
+        .map(|pair| u8::from_str_radix(pair?, 16).ok())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hexadecimal_both_ways() {
+        assert_eq!(to_hex(&[0, 0x1f, 0xff]), "001fff");
+        assert_eq!(from_hex("001fff"), Some(vec![0, 0x1f, 0xff]));
+        for bad in ["0", "0g", "E1x", "é"] {
+            assert_eq!(from_hex(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn checksum_is_the_sum_modulo_256() {
+        // The manual's own example of a packet: $m4015bc,2#5a.
+        assert_eq!(checksum(b"m4015bc,2"), 0x5a);
+    }
+}

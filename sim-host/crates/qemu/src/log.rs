@@ -1,0 +1,119 @@
+//! The firmware's log: defmt frames on its console, decoded with the image's symbols.
+//!
+//! The console is that of a program which may be any, so nothing that comes over it takes memory without bound.
+
+use defmt_decoder::{DecodeError, Table};
+use image::Image;
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// Longest frame, bytes; the firmware's have some hundred.
+const FRAME_BYTES: usize = 4096;
+/// Longest line that is shown, characters.
+const LINE_CHARACTERS: usize = 4096;
+/// Lines that are kept, the last ones.
+const LINES: usize = 1000;
+const DAMAGED: &str = "(a damaged log line)";
+
+/// The symbols of an image's log cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The symbols are damaged.
+    #[error("the image's defmt symbols are damaged{}", .0.as_deref().map_or(String::new(), |reason| format!(": {reason}")))]
+    Damaged(Option<String>),
+    /// Its frames have no ends.
+    #[error("the image's log has no ends of frames; build it with defmt's encoding rzcobs")]
+    Encoding,
+}
+
+/// Decodes an image's log.
+pub struct LogDecoder {
+    table: Option<Table>,
+}
+
+impl LogDecoder {
+    /// The decoder for an image's log. An image without defmt symbols has a log that nobody can read.
+    ///
+    /// # Errors
+    /// If the image's defmt symbols are damaged or of a version or encoding that this program cannot read.
+    pub fn new(image: &Image) -> Result<Self, LogError> {
+        // Some damage makes the crate panic.
+        let Ok(table) = catch_unwind(|| Table::parse(&image.bytes)) else {
+            return Err(LogError::Damaged(None));
+        };
+        let table = table.map_err(|error| LogError::Damaged(Some(format!("{error:#}"))))?;
+        let table = table.filter(|table| !table.is_empty());
+        if table
+            .as_ref()
+            .is_some_and(|table| !table.encoding().can_recover())
+        {
+            return Err(LogError::Encoding);
+        }
+        Ok(Self { table })
+    }
+
+    /// Whether the log can be read; not so in an image whose symbols were stripped.
+    pub fn is_readable(&self) -> bool {
+        self.table.is_some()
+    }
+
+    /// Reads the console to its end; `on_line` sees each line of the log, if it can be read.
+    pub fn decode(&self, mut console: impl std::io::Read, mut on_line: impl FnMut(&str)) {
+        let mut buffer = [0; 4096];
+        let mut frame = Vec::with_capacity(FRAME_BYTES);
+        let mut is_too_long = false;
+        while let Ok(length @ 1..) = console.read(&mut buffer) {
+            let Some(table) = &self.table else { continue };
+            for piece in buffer[..length].split_inclusive(|&byte| byte == 0) {
+                is_too_long |= frame.len() + piece.len() > FRAME_BYTES;
+                if !is_too_long {
+                    frame.extend_from_slice(piece);
+                }
+                if piece.ends_with(&[0]) {
+                    match std::mem::take(&mut is_too_long) {
+                        true => on_line(DAMAGED),
+                        false => decode_frame(table, &frame, &mut on_line),
+                    }
+                    frame.clear();
+                }
+            }
+        }
+    }
+}
+
+/// A frame with its zero; several zeros in a row are the end of one.
+fn decode_frame(table: &Table, frame: &[u8], on_line: &mut impl FnMut(&str)) {
+    // A frame of other symbols can make the crate panic.
+    let line = catch_unwind(AssertUnwindSafe(|| {
+        let mut decoder = table.new_stream_decoder();
+        decoder.received(frame);
+        match decoder.decode() {
+            Ok(frame) => Some(frame.display(false).to_string()),
+            Err(DecodeError::UnexpectedEof) => None,
+            Err(DecodeError::Malformed) => Some(DAMAGED.into()),
+        }
+    }));
+    if let Some(mut line) = line.unwrap_or_else(|_| Some(DAMAGED.into())) {
+        if let Some((end, _)) = line.char_indices().nth(LINE_CHARACTERS) {
+            line.truncate(end);
+        }
+        on_line(&line);
+    }
+}
+
+/// The last lines of a log.
+#[derive(Debug, Default)]
+pub(crate) struct Lines(VecDeque<String>);
+
+impl Lines {
+    pub(crate) fn push(&mut self, line: &str) {
+        if self.0.len() == LINES {
+            self.0.pop_front();
+        }
+        self.0.push_back(line.into());
+    }
+
+    pub(crate) fn into_vec(self) -> Vec<String> {
+        self.0.into()
+    }
+}

@@ -1,0 +1,73 @@
+//! The machines on which the firmware runs.
+
+/// A machine of the emulator.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Machine {
+    /// Cortex-M4F.
+    Mps2An386,
+    /// Cortex-M7.
+    Mps2An500,
+    /// STM32F405, a Cortex-M4F, with timers that are those of the chip.
+    NetduinoPlus2,
+}
+
+impl Machine {
+    /// All machines.
+    pub const ALL: [Self; 3] = [Self::Mps2An386, Self::Mps2An500, Self::NetduinoPlus2];
+
+    /// The emulator's name of it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mps2An386 => "mps2-an386",
+            Self::Mps2An500 => "mps2-an500",
+            Self::NetduinoPlus2 => "netduinoplus2",
+        }
+    }
+
+    /// Clock of the PWM's timer that the board's firmware has, Hz.
+    pub fn timer_clock_hz(self) -> f64 {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => 25e6,
+            Self::NetduinoPlus2 => 16e6,
+        }
+    }
+
+    /// The emulator's options for a host on `line` at the UART that the board's firmware links it with.
+    pub(crate) fn serial_options(self, line: &str) -> Vec<&str> {
+        match self {
+            // UART 0 is the console; UART 1 is the link.
+            Self::Mps2An386 | Self::Mps2An500 => vec!["-serial", "null", "-serial", line],
+            Self::NetduinoPlus2 => vec!["-serial", line],
+        }
+    }
+
+    /// Its core.
+    pub fn core(self) -> &'static str {
+        match self {
+            Self::Mps2An386 | Self::NetduinoPlus2 => "Cortex-M4F",
+            Self::Mps2An500 => "Cortex-M7",
+        }
+    }
+
+    /// The firmware's board whose images run on it.
+    pub fn board(self) -> &'static str {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => "mps2",
+            Self::NetduinoPlus2 => "netduinoplus2",
+        }
+    }
+
+    /// Virtual time is counted in instructions, and idle time is skipped: the same run every time. An instruction takes 2^5
+    /// ns; on the STM32F405 2^3 ns, because its timers run some ten times faster than the program believes.
+    pub(crate) fn instruction_shift(self) -> u32 {
+        match self {
+            Self::Mps2An386 | Self::Mps2An500 => 5,
+            Self::NetduinoPlus2 => 3,
+        }
+    }
+
+    /// Instructions that it executes in a second of its time.
+    pub fn instruction_rate_hz(self) -> f64 {
+        1e9 / f64::from(1 << self.instruction_shift())
+    }
+}

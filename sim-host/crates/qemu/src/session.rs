@@ -1,0 +1,439 @@
+//! The ECU in the emulator, one exchange a PWM period: how a host stands in for its servo and sensors.
+
+use crate::emulator::{Emulator, first_words, is_ready};
+use crate::log::{Lines, LogDecoder};
+use crate::machine::Machine;
+use crate::run::{self, Finished, RunError};
+use image::Image;
+use rustix::event::PollFlags;
+use shared_model::exchange::{TO_HOST_LEN, ToEcu, ToHost};
+use shared_model::serial::{self, Deframer, Received};
+use std::fs::{File, OpenOptions};
+use std::io::{ErrorKind, Read, Write};
+use std::os::fd::OwnedFd;
+use std::os::unix::fs::OpenOptionsExt;
+use std::os::unix::net::UnixStream;
+use std::path::{Path, PathBuf};
+use std::process::ExitStatus;
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// Names of the pipes in the working directory, as the firmware has them.
+const TO_HOST: &str = "to-host";
+const TO_ECU: &str = "to-ecu";
+const UART_SOCKET: &str = "uart";
+const POLL: Duration = Duration::from_millis(2);
+/// Longest wait without a look at the user's wish to stop.
+const LOOK: Duration = Duration::from_millis(100);
+
+/// In the emulator's message where it gives up because a fault came within the handler of a fault.
+const LOCKUP: &str = "Lockup";
+
+/// What carries the exchange.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LinkKind {
+    /// Pipes, read and written by the emulator; the host says when a PWM period begins: fast.
+    Files,
+    /// The same, but the board's timer says when a PWM period begins, and the gate measures the time between control ticks.
+    Timed,
+    /// The board's UART, framed, at the host's pace: realistic and slow.
+    Uart,
+}
+
+impl LinkKind {
+    /// All kinds.
+    pub const ALL: [Self; 3] = [Self::Files, Self::Timed, Self::Uart];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Files => "files",
+            Self::Timed => "timed",
+            Self::Uart => "uart",
+        }
+    }
+
+    /// What carries the exchange, for people.
+    pub fn description(self) -> &'static str {
+        match self {
+            Self::Files => "pipes at the host's pace: fast",
+            Self::Timed => "pipes at the pace of the board's timer, whose ticks the gate measures",
+            Self::Uart => "the board's UART, framed, at the host's pace: realistic and slow",
+        }
+    }
+
+    fn setting(self) -> String {
+        format!("link={}", self.name())
+    }
+}
+
+/// Both directions of the link, neither of which blocks, and what finds packets where they are framed.
+struct Transport {
+    from_ecu: File,
+    to_ecu: File,
+    deframer: Option<Deframer>,
+}
+
+/// An ECU in the emulator that waits for its vehicle. The emulator ends when this is dropped.
+pub struct Session {
+    transport: Transport,
+    attended: Attended,
+    limit: Duration,
+    _directory: tempfile::TempDir,
+}
+
+/// The emulator with the readers of its log and its errors.
+struct Attended {
+    emulator: Emulator,
+    /// Taken at the end.
+    readers: Option<(JoinHandle<Vec<String>>, JoinHandle<String>)>,
+    last_line: Arc<Mutex<String>>,
+}
+
+impl Attended {
+    fn new(mut emulator: Emulator, decoder: LogDecoder) -> Self {
+        let (console, errors) = (emulator.output(), emulator.errors());
+        let last_line = Arc::new(Mutex::new(String::from("(none)")));
+        let seen = Arc::clone(&last_line);
+        let log = thread::spawn(move || {
+            let mut lines = Lines::default();
+            decoder.decode(console, |line| {
+                *seen.lock().expect("nobody panics with it") = line.to_owned();
+                lines.push(line);
+            });
+            lines.into_vec()
+        });
+        let errors = thread::spawn(move || first_words(errors));
+        Self {
+            emulator,
+            readers: Some((log, errors)),
+            last_line,
+        }
+    }
+
+    fn last_line(&self) -> String {
+        let last_line = self.last_line.lock().expect("nobody panics with it");
+        last_line.clone()
+    }
+
+    fn timed_out(&self, limit: Duration) -> RunError {
+        RunError::TimedOut {
+            limit,
+            last_line: self.last_line(),
+        }
+    }
+
+    /// Waits for the end, at most `limit`: how the emulator ended, the log, and the emulator's own message.
+    fn end(&mut self, limit: Duration) -> Result<(ExitStatus, Vec<String>, String), RunError> {
+        let Some(status) = run::wait(&mut self.emulator, limit)? else {
+            return Err(self.timed_out(limit));
+        };
+        // The readers come to their end with the emulator.
+        let (log, errors) = self.readers.take().expect("a run ends once");
+        let log = log.join().expect("the log's reader does not panic");
+        let message = errors.join().expect("the errors' reader does not panic");
+        Ok((status, log, message))
+    }
+
+    /// Why the link broke off: how the emulator ended.
+    fn left(&mut self, limit: Duration) -> RunError {
+        let exit_code = match self.end(limit) {
+            Ok((status, _, message)) if status.code().is_none() && message.contains(LOCKUP) => None,
+            Ok((status, _, message)) => match run::exit_code(status, message) {
+                Ok(exit_code) => Some(exit_code),
+                Err(error) => return error,
+            },
+            Err(error) => return error,
+        };
+        RunError::LinkLost {
+            exit_code,
+            last_line: self.last_line(),
+        }
+    }
+}
+
+impl Session {
+    /// Starts the image with the scenario's settings and opens the link; waits at most `limit` for each answer.
+    ///
+    /// # Errors
+    /// If the emulator is missing or fails, the image has no readable log, or the firmware does not open its end.
+    pub fn start(
+        image: &Image,
+        machine: Machine,
+        settings: &[String],
+        link: LinkKind,
+        options: &[&str],
+        limit: Duration,
+    ) -> Result<Self, RunError> {
+        let directory = tempfile::tempdir().map_err(RunError::NotStarted)?;
+        let decoder = LogDecoder::new(image)?;
+        if !decoder.is_readable() {
+            return Err(RunError::NoLog);
+        }
+        let mut settings = settings.to_vec();
+        settings.push(link.setting());
+        let socket = directory.path().join(UART_SOCKET);
+        let line = format!("unix:{},server=on,wait=on", socket.display());
+        let serial = match link {
+            LinkKind::Files | LinkKind::Timed => run::SILENT.to_vec(),
+            LinkKind::Uart => machine.serial_options(&line),
+        };
+        let waiting = prepare(link, directory.path())?;
+        let options = [&serial, options].concat();
+        let emulator = run::start(image, machine, &settings, directory.path(), &options)?;
+        let mut attended = Attended::new(emulator, decoder);
+        Ok(Self {
+            transport: waiting.open(&mut attended, limit)?,
+            attended,
+            limit,
+            _directory: directory,
+        })
+    }
+
+    /// What the ECU puts out in its next PWM period. It then waits for [`send`](Self::send).
+    ///
+    /// # Errors
+    /// If the emulator has ended, or nothing comes within the limit.
+    pub fn receive(&mut self) -> Result<ToHost, RunError> {
+        let received = self.transport.receive(self.limit);
+        received.map_err(|error| self.lost(&error))
+    }
+
+    /// Answers what was received.
+    ///
+    /// # Errors
+    /// If the emulator has ended, or takes nothing within the limit.
+    pub fn send(&mut self, answer: &ToEcu) -> Result<(), RunError> {
+        let sent = self.transport.send(answer, self.limit);
+        sent.map_err(|error| self.lost(&error))
+    }
+
+    fn lost(&mut self, error: &std::io::Error) -> RunError {
+        match error.kind() {
+            ErrorKind::TimedOut => self.attended.timed_out(self.limit),
+            ErrorKind::Interrupted => RunError::Interrupted,
+            _ => self.attended.left(self.limit),
+        }
+    }
+
+    /// Waits for the firmware to end, which it does once it was told to stop.
+    ///
+    /// # Errors
+    /// If it does not end within the limit, or not as a firmware does.
+    pub fn finish(mut self) -> Result<Finished, RunError> {
+        let (status, log, message) = self.attended.end(self.limit)?;
+        run::finish(status, log, message, true)
+    }
+}
+
+/// What has to be there before the emulator starts.
+enum Waiting {
+    Files { from_ecu: File, to_ecu: PathBuf },
+    Uart { socket: PathBuf },
+}
+
+fn prepare(link: LinkKind, directory: &Path) -> Result<Waiting, RunError> {
+    match link {
+        LinkKind::Files | LinkKind::Timed => {
+            for name in [TO_HOST, TO_ECU] {
+                make_pipe(&directory.join(name))?;
+            }
+            // The emulator opens the other end later.
+            let from_ecu = open_without_waiting(&directory.join(TO_HOST), true);
+            Ok(Waiting::Files {
+                from_ecu: from_ecu.map_err(RunError::NotStarted)?,
+                to_ecu: directory.join(TO_ECU),
+            })
+        }
+        LinkKind::Uart => Ok(Waiting::Uart {
+            socket: directory.join(UART_SOCKET),
+        }),
+    }
+}
+
+fn make_pipe(path: &Path) -> Result<(), RunError> {
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)
+        .map_err(|error| RunError::NotStarted(error.into()))
+}
+
+fn open_without_waiting(path: &Path, read: bool) -> std::io::Result<File> {
+    OpenOptions::new()
+        .read(read)
+        .write(!read)
+        .custom_flags(rustix::fs::OFlags::NONBLOCK.bits() as i32)
+        .open(path)
+}
+
+impl Waiting {
+    /// Opens the link once the emulator has opened its end.
+    fn open(self, attended: &mut Attended, limit: Duration) -> Result<Transport, RunError> {
+        match self {
+            Self::Files { from_ecu, to_ecu } => Ok(Transport {
+                from_ecu,
+                to_ecu: retry(attended, limit, || open_without_waiting(&to_ecu, false))?,
+                deframer: None,
+            }),
+            Self::Uart { socket } => {
+                let stream = retry(attended, limit, || UnixStream::connect(&socket))?;
+                let transport = || {
+                    stream.set_nonblocking(true)?;
+                    Ok(Transport {
+                        to_ecu: OwnedFd::from(stream.try_clone()?).into(),
+                        from_ecu: OwnedFd::from(stream).into(),
+                        deframer: Some(Deframer::new()),
+                    })
+                };
+                transport().map_err(RunError::NotStarted)
+            }
+        }
+    }
+}
+
+/// Tries until the emulator has opened its end.
+fn retry<T>(
+    attended: &mut Attended,
+    limit: Duration,
+    open: impl Fn() -> std::io::Result<T>,
+) -> Result<T, RunError> {
+    let start = Instant::now();
+    loop {
+        if let Ok(opened) = open() {
+            return Ok(opened);
+        }
+        let ended = attended.emulator.try_wait().map_err(RunError::NotStarted)?;
+        if ended.is_some() {
+            return Err(attended.left(limit));
+        }
+        if interrupt::requested() {
+            return Err(RunError::Interrupted);
+        }
+        if start.elapsed() > limit {
+            return Err(attended.timed_out(limit));
+        }
+        thread::sleep(POLL);
+    }
+}
+
+impl Transport {
+    fn receive(&mut self, limit: Duration) -> std::io::Result<ToHost> {
+        let mut bytes = [0; TO_HOST_LEN];
+        match &mut self.deframer {
+            None => read_exact(&mut self.from_ecu, limit, &mut bytes)?,
+            Some(deframer) => receive_packet(&mut self.from_ecu, deframer, limit, &mut bytes)?,
+        }
+        Ok(ToHost::decode(&bytes))
+    }
+
+    fn send(&mut self, answer: &ToEcu, limit: Duration) -> std::io::Result<()> {
+        let bytes = answer.encode();
+        if self.deframer.is_none() {
+            return write_all(&mut self.to_ecu, limit, &bytes);
+        }
+        let mut packet = Vec::with_capacity(bytes.len() + 4);
+        serial::frame(&bytes, |byte| packet.push(byte));
+        write_all(&mut self.to_ecu, limit, &packet)
+    }
+}
+
+/// Fills `bytes`, waiting at most `limit` for each piece: a faulty ECU may stop in the middle of a packet.
+fn read_exact(file: &mut File, limit: Duration, mut bytes: &mut [u8]) -> std::io::Result<()> {
+    while !bytes.is_empty() {
+        let length = read_some(file, limit, bytes)?;
+        bytes = &mut bytes[length..];
+    }
+    Ok(())
+}
+
+fn read_some(file: &mut File, limit: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
+    wait_until_ready(file, PollFlags::IN, limit)?;
+    match file.read(bytes)? {
+        0 => Err(ErrorKind::UnexpectedEof.into()),
+        length => Ok(length),
+    }
+}
+
+fn write_all(file: &mut File, limit: Duration, mut bytes: &[u8]) -> std::io::Result<()> {
+    while !bytes.is_empty() {
+        match file.write(bytes) {
+            Ok(length) => bytes = &bytes[length..],
+            // An emulator that takes nothing has left its pipe full.
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                wait_until_ready(file, PollFlags::OUT, limit)?;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+/// Waits at most `limit`, and no longer than until the user wants to stop.
+fn wait_until_ready(file: &File, flags: PollFlags, limit: Duration) -> std::io::Result<()> {
+    // The clock is looked at only where the answer does not come soon.
+    if is_ready(file, flags, limit.min(LOOK))? {
+        return Ok(());
+    }
+    let start = Instant::now();
+    let limit = limit.saturating_sub(LOOK);
+    loop {
+        if interrupt::requested() {
+            return Err(ErrorKind::Interrupted.into());
+        }
+        let left = limit.saturating_sub(start.elapsed());
+        if is_ready(file, flags, left.min(LOOK))? {
+            return Ok(());
+        }
+        if left.is_zero() {
+            return Err(ErrorKind::TimedOut.into());
+        }
+    }
+}
+
+fn receive_packet(
+    file: &mut File,
+    deframer: &mut Deframer,
+    limit: Duration,
+    bytes: &mut [u8; TO_HOST_LEN],
+) -> std::io::Result<()> {
+    let mut buffer = [0; 64];
+    // Far more than a packet has, with what a line may hold before the first.
+    for _ in 0..64 {
+        // The ECU sends nothing after its packet until it is answered, so nothing is read past it.
+        let length = read_some(file, limit, &mut buffer)?;
+        for &byte in &buffer[..length] {
+            match deframer.push(byte) {
+                Received::Nothing => {}
+                Received::Damaged => return Err(ErrorKind::InvalidData.into()),
+                Received::Body(body) => {
+                    *bytes = body.try_into().map_err(|_| ErrorKind::InvalidData)?;
+                    return Ok(());
+                }
+            }
+        }
+    }
+    Err(ErrorKind::InvalidData.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::fd::OwnedFd;
+
+    #[test]
+    fn half_a_packet_ends_with_the_limit_and_a_closed_link_at_once() {
+        let (ours, mut theirs) = std::io::pipe().expect("a pipe can be made");
+        let mut ours = File::from(OwnedFd::from(ours));
+        let mut read = || {
+            let mut bytes = [0; TO_HOST_LEN];
+            read_exact(&mut ours, Duration::from_millis(20), &mut bytes)
+                .map_err(|error| error.kind())
+        };
+        theirs.write_all(&[0; TO_HOST_LEN]).expect("it takes them");
+        assert_eq!(read(), Ok(()));
+        theirs.write_all(&[0; 2]).expect("it takes them");
+        assert_eq!(read(), Err(ErrorKind::TimedOut));
+        drop(theirs);
+        assert_eq!(read(), Err(ErrorKind::UnexpectedEof));
+    }
+}

@@ -1,0 +1,31 @@
+//! A scenario as the firmware's command line takes it.
+
+use shared_model::Scenario;
+use toml::{Table, Value};
+
+/// One `section.name=value` a parameter, complete, so that the firmware's own presets do not matter. The numbers are those
+/// of f32, in the shortest decimals that read back to the same bits.
+///
+/// ```
+/// let settings = qemu::settings::of(&shared_model::Scenario::<f32>::reconstruction());
+/// assert!(settings.contains(&"vehicle.wheel_radius_m=0.3".into()));
+/// assert!(settings.contains(&"friction.law=coulomb_rate".into()));
+/// ```
+pub fn of(scenario: &Scenario<f32>) -> Vec<String> {
+    let table = Table::try_from(scenario).expect("a scenario is plain tables and values");
+    let mut settings = Vec::new();
+    flatten("", &table, &mut settings);
+    settings
+}
+
+fn flatten(prefix: &str, table: &Table, settings: &mut Vec<String>) {
+    for (name, value) in table {
+        let key = format!("{prefix}{name}");
+        match value {
+            Value::Table(inner) => flatten(&format!("{key}."), inner, settings),
+            Value::Float(number) => settings.push(format!("{key}={}", *number as f32)),
+            Value::String(choice) => settings.push(format!("{key}={choice}")),
+            other => settings.push(format!("{key}={other}")),
+        }
+    }
+}
