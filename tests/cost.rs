@@ -1,4 +1,4 @@
-//! What Rust costs on the target: the model's step and the ECU program's tasks beside the same in C, whose bits are equal.
+//! Cost of Rust on the target: the model's step and the ECU program's tasks beside the C reference, whose bits are equal.
 
 use sim_host::pil::qemu::Machine;
 use std::collections::BTreeMap;
@@ -6,8 +6,9 @@ use std::process::Command;
 use tests::golden::{Figure, check_figures};
 use tests::{TIME_OUT, image, run};
 
-/// The firmware's build takes the same; `cargo xtask target-cost` says how to install it.
+/// The image's build uses the same; `cargo xtask target-cost` prints how to install it.
 const C_COMPILER: &str = "arm-none-eabi-gcc";
+const IMAGE: &str = "c-reference";
 /// Instructions of a call.
 type Counted = BTreeMap<String, u32>;
 
@@ -42,7 +43,7 @@ fn count(settings: &str) -> BTreeMap<(String, String), Counted> {
     let words = settings.split_whitespace().map(str::to_owned);
     let words: Vec<String> = words.collect();
     let machine = Machine::Mps2An386;
-    let finished = run(&image("cost"), machine, &words, folder.path(), TIME_OUT)
+    let finished = run(&image(IMAGE), machine, &words, folder.path(), TIME_OUT)
         .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(finished.exit_code, 0, "{settings}: {:#?}", finished.log);
     finished.log.iter().filter_map(|line| cost(line)).collect()
@@ -93,7 +94,7 @@ fn rust_takes_no_more_instructions_than_c() {
     }
     let about = "Instructions (no cycles) of a call on the board mps2: Rust, the same in C, and the greatest of the three ratios.\n\
          Scenarios: no dither, square wave, sine. docs/cost.md says what is counted.";
-    let compilers = format!("{}; {c_compiler}", image("cost").compiler);
+    let compilers = format!("{}; {c_compiler}", image(IMAGE).compiler);
     check_figures("cost.txt", about, &compilers, &figures);
 }
 

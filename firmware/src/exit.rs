@@ -22,8 +22,6 @@ pub enum ExitCode {
     UnexpectedInterrupt = 16,
     /// The link to the vehicle cannot be opened, or does not answer.
     LinkLost = 17,
-    /// The program's twin in C gave other bits.
-    Unequal = 18,
 }
 
 /// SYS_EXIT_EXTENDED, the exit that takes a code along.

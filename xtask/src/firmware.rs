@@ -36,14 +36,27 @@ pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
 }
 
 fn cargo_into(toolchain: &str, command: &str, board: &str, target_dir: &Path) -> Result<Command> {
+    let mut cargo = cargo_for_target(toolchain, command, target_dir)?;
+    cargo
+        .arg("--no-default-features")
+        .arg(format!("--features=board-{board}"));
+    Ok(cargo)
+}
+
+/// A command of cargo on a package for the usual board.
+pub fn cargo_on(toolchain: &str, command: &str, package: &str) -> Result<Command> {
+    let mut cargo = cargo_for_target(toolchain, command, &target_dir(USUAL_BOARD)?)?;
+    cargo.args(["--package", package]);
+    Ok(cargo)
+}
+
+fn cargo_for_target(toolchain: &str, command: &str, target_dir: &Path) -> Result<Command> {
     let mut cargo = rustup::cargo(toolchain)?;
     cargo
         .current_dir(workspace::firmware())
         .arg(command)
         .args(["--profile", "firmware"])
         .args(workspace::locked())
-        .arg("--no-default-features")
-        .arg(format!("--features=board-{board}"))
         .arg("--target-dir")
         .arg(target_dir);
     // These would replace what that configuration says: its target, and its linker arguments.

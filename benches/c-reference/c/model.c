@@ -1,6 +1,6 @@
 /* The vehicle model's step: shared-model/src/integrate.rs, vehicle.rs, tire.rs and friction.rs. */
 
-#include "twin.h"
+#include "reference.h"
 
 #define NODES 32
 
@@ -94,8 +94,8 @@ static inline float softened_force(const struct cubic_tire *tire, float mean_squ
 static float magic_force(const struct magic_formula *tire, float alpha)
 {
     const float b_alpha = tire->stiffness_per_rad * alpha;
-    const float argument = b_alpha * (1.0f - tire->curvature) + tire->curvature * twin_atanf(b_alpha);
-    return tire->peak_n * twin_sinf(tire->shape * twin_atanf(argument));
+    const float argument = b_alpha * (1.0f - tire->curvature) + tire->curvature * reference_atanf(b_alpha);
+    return tire->peak_n * reference_sinf(tire->shape * reference_atanf(argument));
 }
 
 static float dithered_magic_force(const struct tire *tire, float alpha, struct injection injection)
@@ -145,9 +145,9 @@ static inline void cornering_forces(const struct model *model, const struct vect
         front_slip = model->front_lever_s * gamma;
         rear_slip = model->rear_lever_s * gamma;
     } else {
-        const float along = gamma * twin_cosf(beta);
-        front_slip = twin_atanf(model->front_lever_s * along);
-        rear_slip = twin_atanf(model->rear_lever_s * along);
+        const float along = gamma * reference_cosf(beta);
+        front_slip = reference_atanf(model->front_lever_s * along);
+        rear_slip = reference_atanf(model->rear_lever_s * along);
     }
     *front = tire_force(&model->front, beta + front_slip - delta, injection);
     *rear = tire_force(&model->rear, beta - rear_slip, injection);
@@ -207,7 +207,7 @@ static float smooth_sign(float amplitude, float argument)
         return 1.0f;
     if (ratio <= -1.0f)
         return -1.0f;
-    return twin_asinf(ratio) * 0.63661977236758134308f;
+    return reference_asinf(ratio) * 0.63661977236758134308f;
 }
 
 static inline bool can_stick(const struct model *model, struct injection injection)
@@ -276,7 +276,7 @@ static inline struct vector derivative(const struct model *model, const struct v
         acceleration = torque * model->inverse_steering_inertia;
     }
     if (model->slip_form == SLIP_EXACT)
-        yaw *= twin_cosf(state->x[SIDESLIP]);
+        yaw *= reference_cosf(state->x[SIDESLIP]);
     return (struct vector){ { (front + rear) * model->lateral_gain - gamma, yaw, rate, acceleration } };
 }
 
@@ -411,10 +411,10 @@ static void tire_init(struct tire *tire, enum tire_kind kind, struct magic_formu
     tire->magic = magic;
     tire->cubic = cubic(&magic);
     for (int k = 0; k < NODES; k++)
-        tire->nodes[k] = twin_cosf((float)((2 * k + 1) * 3.14159265358979323846 / (2 * NODES)));
+        tire->nodes[k] = reference_cosf((float)((2 * k + 1) * 3.14159265358979323846 / (2 * NODES)));
 }
 
-void twin_model_init(void *memory, const struct twin_choice *choice)
+void reference_model_init(void *memory, const struct reference_choice *choice)
 {
     struct task *task = memory;
     struct model *model = &task->model;
@@ -441,12 +441,12 @@ void twin_model_init(void *memory, const struct twin_choice *choice)
                                                                               0.0f;
 }
 
-size_t twin_model_size(void)
+size_t reference_model_size(void)
 {
     return sizeof(struct task);
 }
 
-void twin_model_set_state(void *memory, const struct twin_state *state)
+void reference_model_set_state(void *memory, const struct reference_state *state)
 {
     struct task *task = memory;
 
@@ -455,7 +455,7 @@ void twin_model_set_state(void *memory, const struct twin_state *state)
     task->friction = state->friction;
 }
 
-void twin_model_state(const void *memory, struct twin_state *state)
+void reference_model_state(const void *memory, struct reference_state *state)
 {
     const struct task *task = memory;
 
@@ -464,10 +464,10 @@ void twin_model_state(const void *memory, struct twin_state *state)
     state->friction = task->friction;
 }
 
-void twin_model_step(void *memory, const void *injection, void *unused)
+void reference_model_step(void *memory, const void *injection, void *unused)
 {
     struct task *task = memory;
-    const struct twin_injection *given = injection;
+    const struct reference_injection *given = injection;
 
     (void)unused;
     step(&task->model, &task->x, &task->friction, task->step_s,

@@ -1,4 +1,4 @@
-//! What passes between the Rust program and its twin in C: the declarations of `c-twin/twin.h`.
+//! The interface of the Rust program and the C reference: the declarations of `c/reference.h`.
 
 use core::ffi::c_void;
 use shared_model::Scenario;
@@ -207,17 +207,17 @@ impl From<&ControlOutput<f32>> for ControlOutputBits {
 
 // SAFETY: declared as in twin.h.
 unsafe extern "C" {
-    pub fn twin_model_size() -> usize;
-    pub fn twin_pwm_size() -> usize;
-    pub fn twin_control_size() -> usize;
-    pub fn twin_model_init(memory: *mut c_void, choice: *const Choice);
-    pub fn twin_pwm_init(memory: *mut c_void, choice: *const Choice);
-    pub fn twin_control_init(memory: *mut c_void, choice: *const Choice);
-    pub fn twin_model_set_state(memory: *mut c_void, state: *const StateBits);
-    pub fn twin_model_state(memory: *const c_void, state: *mut StateBits);
-    pub fn twin_model_step(memory: *mut c_void, injection: *const c_void, unused: *mut c_void);
-    pub fn twin_pwm_period(memory: *mut c_void, input: *const c_void, output: *mut c_void);
-    pub fn twin_control_tick(memory: *mut c_void, input: *const c_void, output: *mut c_void);
+    pub fn reference_model_size() -> usize;
+    pub fn reference_pwm_size() -> usize;
+    pub fn reference_control_size() -> usize;
+    pub fn reference_model_init(memory: *mut c_void, choice: *const Choice);
+    pub fn reference_pwm_init(memory: *mut c_void, choice: *const Choice);
+    pub fn reference_control_init(memory: *mut c_void, choice: *const Choice);
+    pub fn reference_model_set_state(memory: *mut c_void, state: *const StateBits);
+    pub fn reference_model_state(memory: *const c_void, state: *mut StateBits);
+    pub fn reference_model_step(memory: *mut c_void, injection: *const c_void, unused: *mut c_void);
+    pub fn reference_pwm_period(memory: *mut c_void, input: *const c_void, output: *mut c_void);
+    pub fn reference_control_tick(memory: *mut c_void, input: *const c_void, output: *mut c_void);
 }
 
 macro_rules! share {
@@ -232,8 +232,8 @@ macro_rules! share {
 
 // The transcendental functions are those of one library for both.
 share! {
-    twin_sinf = shared_model::Real::sin;
-    twin_cosf = shared_model::Real::cos;
-    twin_atanf = shared_model::Real::atan;
-    twin_asinf = shared_model::Real::asin;
+    reference_sinf = shared_model::Real::sin;
+    reference_cosf = shared_model::Real::cos;
+    reference_atanf = shared_model::Real::atan;
+    reference_asinf = shared_model::Real::asin;
 }

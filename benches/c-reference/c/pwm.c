@@ -2,7 +2,7 @@
 
 #include "channels.h"
 #include "gate.h"
-#include "twin.h"
+#include "reference.h"
 #include <math.h>
 #include <string.h>
 
@@ -43,7 +43,7 @@ struct channel {
     struct oscillator oscillator;
     struct limiter limiter;
     struct servo servo;
-    struct twin_setpoint setpoint;
+    struct reference_setpoint setpoint;
     uint32_t periods_a_tick;
     uint32_t periods_to_tick;
 };
@@ -124,7 +124,7 @@ static inline void watch_half_period(struct limiter *limiter, float dither_v, fl
 }
 
 /* Servo voltage: the motor's share and the dither's sample, the latter only if it is within its amplitude. */
-static inline float limiter_run(struct limiter *limiter, const struct twin_setpoint *setpoint, float dither_v)
+static inline float limiter_run(struct limiter *limiter, const struct reference_setpoint *setpoint, float dither_v)
 {
     const float amplitude_v = setpoint->dither_amplitude_v;
     const bool is_within = fabsf(dither_v) <= amplitude_v * (1.0f + limiter->sample_error);
@@ -213,11 +213,11 @@ static inline uint32_t task_faults(struct task *task)
     return task->faults;
 }
 
-void twin_pwm_period(void *memory, const void *given, void *result)
+void reference_pwm_period(void *memory, const void *given, void *result)
 {
     struct task *task = memory;
-    const struct twin_pwm_input *input = given;
-    struct twin_pwm_output *output = result;
+    const struct reference_pwm_input *input = given;
+    struct reference_pwm_output *output = result;
     const struct period period = task_begin(task);
 
     if (period.control_due && input->has_setpoints) {
@@ -231,12 +231,12 @@ void twin_pwm_period(void *memory, const void *given, void *result)
     output->faults = period.control_due ? task_faults(task) : 0;
 }
 
-size_t twin_pwm_size(void)
+size_t reference_pwm_size(void)
 {
     return sizeof(struct task);
 }
 
-void twin_pwm_init(void *memory, const struct twin_choice *choice)
+void reference_pwm_init(void *memory, const struct reference_choice *choice)
 {
     struct task *task = memory;
     const float samples_times_rate = (float)PI * PWM_RATE_HZ;

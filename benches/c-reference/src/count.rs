@@ -1,6 +1,6 @@
 //! Counts instructions by the emulator's time, in which one takes 32 ns.
 
-use crate::twin::Call;
+use crate::interface::Call;
 use core::ffi::c_void;
 use core::hint::black_box;
 use core::mem::MaybeUninit;
