@@ -2,26 +2,26 @@
 //! amplitude. The gate that guards it shares no code with it.
 
 use crate::Real;
-use crate::parameter::{Field, ParameterSet};
+use crate::parameter::parameters;
 use crate::scenario::Scenario;
 use crate::schedule::Table;
 use crate::signal::Measurement;
 
-/// When the dither is on, and how fast commands may move.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Policy<T> {
-    /// Wheel speed below which there is no dither, rpm.
-    pub dither_off_below_rpm: T,
-    /// The dither comes on again this much above that speed, rpm.
-    pub hysteresis_rpm: T,
-    /// Time in which the schedule's greatest amplitude comes in and goes out, s.
-    pub dither_ramp_s: T,
-    /// Greatest motor current that a request gets, A.
-    pub motor_current_a: T,
-    /// Greatest change of the motor current, A/s.
-    pub motor_slew_a_per_s: T,
+parameters! {
+    section "policy";
+    /// When the dither is on, and how fast commands may move.
+    pub struct Policy {
+        /// Wheel speed below which there is no dither, rpm.
+        dither_off_below_rpm: 0.0..=1e5,
+        /// The dither comes on again this much above that speed, rpm.
+        hysteresis_rpm: 0.0..=1e4,
+        /// Time in which the schedule's greatest amplitude comes in and goes out, s.
+        dither_ramp_s: 1e-3..=100.0,
+        /// Greatest motor current that a request gets, A.
+        motor_current_a: 0.0..=1000.0,
+        /// Greatest change of the motor current, A/s.
+        motor_slew_a_per_s: 1e-3..=1e6,
+    }
 }
 
 impl<T: Real> Policy<T> {
@@ -35,53 +35,6 @@ impl<T: Real> Policy<T> {
             motor_slew_a_per_s: T::from_f64(10.0),
         }
     }
-
-    /// The same policy in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Policy<U> {
-        Policy {
-            dither_off_below_rpm: f(self.dither_off_below_rpm),
-            hysteresis_rpm: f(self.hysteresis_rpm),
-            dither_ramp_s: f(self.dither_ramp_s),
-            motor_current_a: f(self.motor_current_a),
-            motor_slew_a_per_s: f(self.motor_slew_a_per_s),
-        }
-    }
-}
-
-impl<T: Real> ParameterSet<T> for Policy<T> {
-    const SECTION: &'static str = "policy";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "dither_off_below_rpm",
-            min: 0.0,
-            max: 1e5,
-            place: |p| &mut p.dither_off_below_rpm,
-        },
-        Field {
-            name: "hysteresis_rpm",
-            min: 0.0,
-            max: 1e4,
-            place: |p| &mut p.hysteresis_rpm,
-        },
-        Field {
-            name: "dither_ramp_s",
-            min: 1e-3,
-            max: 100.0,
-            place: |p| &mut p.dither_ramp_s,
-        },
-        Field {
-            name: "motor_current_a",
-            min: 0.0,
-            max: 1000.0,
-            place: |p| &mut p.motor_current_a,
-        },
-        Field {
-            name: "motor_slew_a_per_s",
-            min: 1e-3,
-            max: 1e6,
-            place: |p| &mut p.motor_slew_a_per_s,
-        },
-    ];
 }
 
 /// What the controller asks for until the next control tick.

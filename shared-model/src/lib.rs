@@ -14,6 +14,7 @@ pub mod frame;
 pub mod friction;
 pub mod gate;
 pub mod integrate;
+mod listed;
 pub mod open_loop;
 pub mod parameter;
 pub mod real;

@@ -5,7 +5,8 @@ use crate::controller::Policy;
 use crate::dither::{Application, Dither, Waveform};
 use crate::friction::{Friction, FrictionLaw};
 use crate::gate::Limits;
-use crate::parameter::{Field, OutOfRange, ParameterSet};
+use crate::listed;
+use crate::parameter::{OutOfRange, ParameterSet, parameters};
 use crate::servo::Servo;
 use crate::short::Short;
 use crate::stability::{MOST_STEP_TIMES_RATE, fastest_rate_per_s, least_rate_hz};
@@ -34,81 +35,27 @@ pub struct Tires<T> {
     pub rear: MagicFormula<T>,
 }
 
-/// Speed, rates, length and start of a run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Run<T> {
-    /// Wheel speed N, rpm.
-    pub wheel_speed_rpm: T,
-    /// Length of the run, s.
-    pub duration_s: T,
-    /// Rate of the control task, Hz: the model's step rate under averaged dither.
-    pub control_rate_hz: T,
-    /// Rate of the PWM task, Hz: carrier, dither samples, and the model's step rate under the dither as a signal.
-    pub pwm_rate_hz: T,
-    /// Sideslip angle beta at the start, rad.
-    pub sideslip_rad: T,
-    /// Yaw rate gamma at the start, rad/s.
-    pub yaw_rate_rad_per_s: T,
-    /// Front steering angle delta_f at the start, rad.
-    pub steering_angle_rad: T,
-    /// Steering rate at the start, rad/s.
-    pub steering_rate_rad_per_s: T,
-}
-
-impl<T: Real> ParameterSet<T> for Run<T> {
-    const SECTION: &'static str = "run";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "wheel_speed_rpm",
-            min: 1.0,
-            max: 1e5,
-            place: |p| &mut p.wheel_speed_rpm,
-        },
-        Field {
-            name: "duration_s",
-            min: 1e-4,
-            max: 1e6,
-            place: |p| &mut p.duration_s,
-        },
-        Field {
-            name: "control_rate_hz",
-            min: 10.0,
-            max: 1e6,
-            place: |p| &mut p.control_rate_hz,
-        },
-        Field {
-            name: "pwm_rate_hz",
-            min: 10.0,
-            max: 1e6,
-            place: |p| &mut p.pwm_rate_hz,
-        },
-        Field {
-            name: "sideslip_rad",
-            min: -10.0,
-            max: 10.0,
-            place: |p| &mut p.sideslip_rad,
-        },
-        Field {
-            name: "yaw_rate_rad_per_s",
-            min: -100.0,
-            max: 100.0,
-            place: |p| &mut p.yaw_rate_rad_per_s,
-        },
-        Field {
-            name: "steering_angle_rad",
-            min: -10.0,
-            max: 10.0,
-            place: |p| &mut p.steering_angle_rad,
-        },
-        Field {
-            name: "steering_rate_rad_per_s",
-            min: -1000.0,
-            max: 1000.0,
-            place: |p| &mut p.steering_rate_rad_per_s,
-        },
-    ];
+parameters! {
+    section "run";
+    /// Speed, rates, length and start of a run.
+    pub struct Run {
+        /// Wheel speed N, rpm.
+        wheel_speed_rpm: 1.0..=1e5,
+        /// Length of the run, s.
+        duration_s: 1e-4..=1e6,
+        /// Rate of the control task, Hz: the model's step rate under averaged dither.
+        control_rate_hz: 10.0..=1e6,
+        /// Rate of the PWM task, Hz: carrier, dither samples, and the model's step rate under the dither as a signal.
+        pwm_rate_hz: 10.0..=1e6,
+        /// Sideslip angle beta at the start, rad.
+        sideslip_rad: -10.0..=10.0,
+        /// Yaw rate gamma at the start, rad/s.
+        yaw_rate_rad_per_s: -100.0..=100.0,
+        /// Front steering angle delta_f at the start, rad.
+        steering_angle_rad: -10.0..=10.0,
+        /// Steering rate at the start, rad/s.
+        steering_rate_rad_per_s: -1000.0..=1000.0,
+    }
 }
 
 /// Every parameter of one run.
@@ -136,13 +83,15 @@ pub struct Scenario<T> {
     pub run: Run<T>,
 }
 
-/// A named scenario.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Preset {
-    /// The reading of the paper that reproduces its claims: Coulomb friction on the steering rate with true stick.
-    Reconstruction,
-    /// The equations as printed: friction by the sign of the steering angle.
-    Printed,
+listed! {
+    /// A named scenario.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Preset {
+        /// The reading of the paper that reproduces its claims: Coulomb friction on the steering rate with true stick.
+        Reconstruction => "reconstruction",
+        /// The equations as printed: friction by the sign of the steering angle.
+        Printed => "printed",
+    }
 }
 
 impl<T: Real> Scenario<T> {
@@ -231,7 +180,6 @@ impl<T: Real> Scenario<T> {
 
     /// The same scenario in another arithmetic.
     pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Scenario<U> {
-        let run = &self.run;
         Scenario {
             vehicle: self.vehicle.map(f),
             tires: Tires {
@@ -245,16 +193,7 @@ impl<T: Real> Scenario<T> {
             servo: self.servo.map(f),
             policy: self.policy.map(f),
             gate: self.gate.map(f),
-            run: Run {
-                wheel_speed_rpm: f(run.wheel_speed_rpm),
-                duration_s: f(run.duration_s),
-                control_rate_hz: f(run.control_rate_hz),
-                pwm_rate_hz: f(run.pwm_rate_hz),
-                sideslip_rad: f(run.sideslip_rad),
-                yaw_rate_rad_per_s: f(run.yaw_rate_rad_per_s),
-                steering_angle_rad: f(run.steering_angle_rad),
-                steering_rate_rad_per_s: f(run.steering_rate_rad_per_s),
-            },
+            run: self.run.map(f),
         }
     }
 

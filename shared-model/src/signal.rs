@@ -1,6 +1,7 @@
 //! What passes between vehicle and ECU: measurements in, the actuation's state out.
 
 use crate::Real;
+use crate::listed;
 
 /// What the sensors tell, once a control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,24 +31,24 @@ impl<T: Real> Measurement<T> {
     }
 }
 
-/// What the ECU is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Mode {
-    /// No valid sensor frame yet; the servo is neutral.
-    Starting = 0,
-    /// Following the driver's request, with dither where the policy has it.
-    Active = 1,
-    /// A fault was found: dither ramped out, servo neutral, until restart.
-    Safe = 2,
+listed! {
+    /// What the ECU is doing.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum Mode {
+        /// No valid sensor frame yet; the servo is neutral.
+        Starting = 0,
+        /// Following the driver's request, with dither where the policy has it.
+        Active = 1,
+        /// A fault was found: dither ramped out, servo neutral, until restart.
+        Safe = 2,
+    }
 }
 
 impl Mode {
     /// The mode of that number in a frame.
     pub fn from_code(code: u8) -> Option<Self> {
-        [Self::Starting, Self::Active, Self::Safe]
-            .into_iter()
-            .find(|mode| *mode as u8 == code)
+        Self::ALL.into_iter().find(|mode| *mode as u8 == code)
     }
 }
 

@@ -2,7 +2,8 @@
 
 use crate::dither::Injection;
 use crate::friction::{Friction, FrictionLaw, FrictionMode, Sign};
-use crate::parameter::{Field, ParameterSet};
+use crate::listed;
+use crate::parameter::parameters;
 use crate::tire::Tire;
 use crate::{Real, Scenario};
 use nalgebra::Vector4;
@@ -16,34 +17,38 @@ pub const STEERING_ANGLE: usize = 2;
 /// Index of the steering rate (rad/s) in a state vector.
 pub const STEERING_RATE: usize = 3;
 
-/// Form of the slip angles and of the yaw moment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum SlipForm {
-    /// Second lines of (4) and (5); yaw moment without cos(beta), as in (14).
-    SmallAngle,
-    /// First lines of (4) and (5); yaw moment with cos(beta), as in (3).
-    Exact,
+listed! {
+    /// Form of the slip angles and of the yaw moment.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+    pub enum SlipForm {
+        /// Second lines of (4) and (5); yaw moment without cos(beta), as in (14).
+        SmallAngle => "small_angle",
+        /// First lines of (4) and (5); yaw moment with cos(beta), as in (3).
+        Exact => "exact",
+    }
 }
 
-/// Parameters of the chassis, Table 2.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Vehicle<T> {
-    /// Form of the slip angles.
-    pub slip_form: SlipForm,
-    /// Mass m, kg.
-    pub mass_kg: T,
-    /// Yaw moment of inertia I_z, kg m^2.
-    pub yaw_inertia_kg_m2: T,
-    /// Distance l_f from the centre of gravity to the front axle, m.
-    pub front_axle_distance_m: T,
-    /// Distance l_r from the centre of gravity to the rear axle, m.
-    pub rear_axle_distance_m: T,
-    /// Wheel radius R, m (the paper's is in cm).
-    pub wheel_radius_m: T,
+parameters! {
+    section "vehicle";
+    /// Parameters of the chassis, Table 2.
+    pub struct Vehicle {
+        choices {
+            /// Form of the slip angles.
+            slip_form: SlipForm,
+        }
+        /// Mass m, kg.
+        mass_kg: 1.0..=1e5,
+        /// Yaw moment of inertia I_z, kg m^2.
+        yaw_inertia_kg_m2: 1.0..=1e6,
+        /// Distance l_f from the centre of gravity to the front axle, m.
+        front_axle_distance_m: 0.01..=20.0,
+        /// Distance l_r from the centre of gravity to the rear axle, m.
+        rear_axle_distance_m: 0.01..=20.0,
+        /// Wheel radius R, m (the paper's is in cm).
+        wheel_radius_m: 0.01..=5.0,
+    }
 }
 
 impl<T: Real> Vehicle<T> {
@@ -56,54 +61,6 @@ impl<T: Real> Vehicle<T> {
     pub fn speed_m_per_s(&self, wheel_speed_rpm: T) -> T {
         T::from_f64(core::f64::consts::TAU / 60.0) * self.wheel_radius_m * wheel_speed_rpm
     }
-
-    /// The same parameters in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Vehicle<U> {
-        Vehicle {
-            slip_form: self.slip_form,
-            mass_kg: f(self.mass_kg),
-            yaw_inertia_kg_m2: f(self.yaw_inertia_kg_m2),
-            front_axle_distance_m: f(self.front_axle_distance_m),
-            rear_axle_distance_m: f(self.rear_axle_distance_m),
-            wheel_radius_m: f(self.wheel_radius_m),
-        }
-    }
-}
-
-impl<T: Real> ParameterSet<T> for Vehicle<T> {
-    const SECTION: &'static str = "vehicle";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "mass_kg",
-            min: 1.0,
-            max: 1e5,
-            place: |p| &mut p.mass_kg,
-        },
-        Field {
-            name: "yaw_inertia_kg_m2",
-            min: 1.0,
-            max: 1e6,
-            place: |p| &mut p.yaw_inertia_kg_m2,
-        },
-        Field {
-            name: "front_axle_distance_m",
-            min: 0.01,
-            max: 20.0,
-            place: |p| &mut p.front_axle_distance_m,
-        },
-        Field {
-            name: "rear_axle_distance_m",
-            min: 0.01,
-            max: 20.0,
-            place: |p| &mut p.rear_axle_distance_m,
-        },
-        Field {
-            name: "wheel_radius_m",
-            min: 0.01,
-            max: 5.0,
-            place: |p| &mut p.wheel_radius_m,
-        },
-    ];
 }
 
 /// State of the model: the vector and the friction element's mode.

@@ -60,7 +60,7 @@ fn suggest(near: &Option<String>) -> String {
 }
 
 fn names<C: Choice>() -> String {
-    let names: Vec<&str> = C::ALL.iter().map(|&(name, _)| name).collect();
+    let names: Vec<&str> = C::ALL.iter().map(|choice| choice.name()).collect();
     names.join(", ")
 }
 

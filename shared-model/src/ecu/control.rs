@@ -8,48 +8,31 @@ use crate::frame::{
     ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_measurement, encode_actuation,
 };
 use crate::gate::{Fault, Faults, Observation, Setpoint, Supervisor};
+use crate::listed;
 use crate::signal::{Actuation, Measurement};
 use crate::{Real, Scenario};
 
-/// An event that is detected and tolerated. The number is its bit in a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Warning {
-    /// A sensor frame did not come.
-    FrameMissing = 0,
-    /// A sensor frame was damaged, or another frame in its place.
-    FrameDamaged = 1,
-    /// A sensor frame came twice.
-    FrameRepeated = 2,
-    /// A sensor frame came out of sequence.
-    FrameSequence = 3,
-    /// Sensor frames before this one were lost.
-    FramesLost = 4,
+listed! {
+    /// An event that is detected and tolerated. The number is its bit in a frame.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum Warning {
+        /// A sensor frame did not come.
+        FrameMissing = 0 => "frame missing",
+        /// A sensor frame was damaged, or another frame in its place.
+        FrameDamaged = 1 => "frame damaged",
+        /// A sensor frame came twice.
+        FrameRepeated = 2 => "frame repeated",
+        /// A sensor frame came out of sequence.
+        FrameSequence = 3 => "frame sequence",
+        /// Sensor frames before this one were lost.
+        FramesLost = 4 => "frames lost",
+    }
 }
 
 impl Warning {
-    /// All warnings.
-    pub const ALL: [Self; 5] = [
-        Self::FrameMissing,
-        Self::FrameDamaged,
-        Self::FrameRepeated,
-        Self::FrameSequence,
-        Self::FramesLost,
-    ];
-
     fn bit(self) -> u16 {
         1 << self as u16
-    }
-
-    /// Its name, for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::FrameMissing => "frame missing",
-            Self::FrameDamaged => "frame damaged",
-            Self::FrameRepeated => "frame repeated",
-            Self::FrameSequence => "frame sequence",
-            Self::FramesLost => "frames lost",
-        }
     }
 }
 
@@ -262,7 +245,7 @@ mod tests {
         {
             for bit in 0..32 {
                 let mut scenario = Scenario::reconstruction();
-                flip((field.place)(&mut scenario.gate), bit);
+                flip((field.accessor)(&mut scenario.gate), bit);
                 let supervisor = Supervisor::new(&scenario, CLOCK_HZ);
                 let task = damaged(channel, |one| one.supervisor = supervisor);
                 assert_found(task, field.name, bit);
@@ -278,7 +261,7 @@ mod tests {
         {
             for bit in 0..32 {
                 let mut scenario = Scenario::reconstruction();
-                flip((field.place)(&mut scenario.policy), bit);
+                flip((field.accessor)(&mut scenario.policy), bit);
                 let controller = Controller::new(&scenario);
                 let task = damaged(channel, |one| one.controller = controller);
                 assert_found(task, field.name, bit);
