@@ -205,7 +205,7 @@ impl From<&ControlOutput<f32>> for ControlOutputBits {
     }
 }
 
-// SAFETY: declared as in twin.h.
+// SAFETY: declared as in reference.h.
 unsafe extern "C" {
     pub fn reference_model_size() -> usize;
     pub fn reference_pwm_size() -> usize;
