@@ -104,4 +104,4 @@ unsafe impl defmt::Logger for Logger {
     }
 }
 
-defmt::timestamp!("{=u32:ms}", crate::tasks::elapsed_ms());
+defmt::timestamp!("{=u32:ms}", crate::clock::elapsed_ms());

@@ -1,9 +1,10 @@
 //! Telemetry: rings from the interrupts to the main loop, and the stream from there to the host.
 
 use crate::board::{Board, Current};
+use crate::counters::{count_overrun, overruns, saturate};
 use crate::exit::ExitCode;
 use crate::host_file::{HostFile, HostFileError};
-use crate::{spacing, stack, tasks};
+use crate::{spacing, stack};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use critical_section::Mutex;
@@ -22,17 +23,6 @@ static RECORDED: Mutex<Cell<Option<Producer<'static, u16, DUTY_RING>>>> =
     Mutex::new(Cell::new(None));
 static FILE: AtomicUsize = AtomicUsize::new(NOT_OPEN);
 static RECORDS: AtomicU32 = AtomicU32::new(0);
-static OVERRUNS: AtomicU32 = AtomicU32::new(0);
-
-/// Counts a record or duty code that was lost, or a task that was late. Any of them fails the run.
-pub fn count_overrun() {
-    OVERRUNS.fetch_add(1, Ordering::Relaxed);
-}
-
-/// Overruns so far.
-pub fn overruns() -> u32 {
-    OVERRUNS.load(Ordering::Relaxed)
-}
 
 /// Where the PWM interrupt puts the duty codes that the PWM holds.
 pub struct DutyRecording(Producer<'static, u16, DUTY_RING>);
@@ -170,8 +160,8 @@ pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
         stack_bytes: stack::deepest_bytes(),
         final_duty,
         neutral_duty,
-        least_spacing: tasks::saturate(least_spacing),
-        most_spacing: tasks::saturate(most_spacing),
+        least_spacing: saturate(least_spacing),
+        most_spacing: saturate(most_spacing),
     };
     let mut bytes = [0; TRAILER_LEN];
     trailer.encode(&mut bytes);

@@ -1,6 +1,6 @@
 //! Images of the firmware, and the log that one of them writes.
 
-use crate::{Target, as_it_is};
+use crate::target::{Target, as_it_is};
 use object::write::{Object, Symbol, SymbolSection};
 use object::{
     Architecture, BinaryFormat, Endianness, SectionKind, SymbolFlags, SymbolKind, SymbolScope,

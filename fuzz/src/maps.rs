@@ -1,6 +1,6 @@
 //! What a map is kept in: tiles, and the Parquet file that a schedule begins with.
 
-use crate::{Target, as_it_is};
+use crate::target::{Target, as_it_is};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use sim_host::chaos::sweep::Timing;

@@ -1,6 +1,6 @@
 //! What the firmware tells: telemetry, and all that passes in the loop.
 
-use crate::Target;
+use crate::target::Target;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::exchange::PACKET_LEN;

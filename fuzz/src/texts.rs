@@ -1,6 +1,6 @@
 //! Texts: configurations, manoeuvres, settings, and what a reproduction keeps of its work.
 
-use crate::{Target, as_it_is};
+use crate::target::{Target, as_it_is};
 use shared_model::Scenario;
 use sim_host::closed_loop::drive::{Drive, ecu_scenario};
 use sim_host::closed_loop::ecu::Software;

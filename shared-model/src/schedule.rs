@@ -3,8 +3,6 @@
 //! The ECU carries one for each waveform, [`crate::schedule_table`], made by `sim-host schedule`.
 
 use crate::Real;
-use crate::dither::Waveform;
-use crate::schedule_table::{POINTS, SINE, SQUARE};
 
 /// Amplitudes of one waveform at equally spaced wheel speeds. Small and `Copy`: each channel of the ECU holds its own in RAM.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,24 +13,6 @@ pub struct Schedule<T, const POINTS: usize> {
     pub step_rpm: T,
     /// Amplitude W at each wheel speed, V; 0 where the motion needs no dither.
     pub amplitudes_v: [T; POINTS],
-}
-
-/// A schedule of the size that the ECU carries.
-pub type Table<T> = Schedule<T, POINTS>;
-
-impl<T: Real> Table<T> {
-    /// The ECU's schedule for a waveform; without one all amplitudes are 0.
-    pub fn of(waveform: Waveform) -> Self {
-        let table = match waveform {
-            Waveform::None => Schedule {
-                amplitudes_v: [0.0; POINTS],
-                ..SQUARE
-            },
-            Waveform::Square => SQUARE,
-            Waveform::Sine => SINE,
-        };
-        table.map(&|value| T::from_f64(value.into()))
-    }
 }
 
 impl<T: Real, const POINTS: usize> Schedule<T, POINTS> {

@@ -1,11 +1,11 @@
 //! Scenarios as text, one `section.name=value` a setting: how a scenario reaches the ECU without a rebuild.
 
 use crate::Real;
-use crate::controller::Policy;
 use crate::dither::{Application, Dither, Waveform};
 use crate::friction::{Friction, FrictionLaw};
 use crate::gate::Limits;
 use crate::parameter::ParameterSet;
+use crate::policy::Policy;
 use crate::scenario::{Preset, Run, Scenario};
 use crate::servo::Servo;
 use crate::steering::Steering;

@@ -2,7 +2,7 @@
 
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use shared_model::schedule::Table;
+use shared_model::ecu_schedule::Table;
 use shared_model::signal::Mode;
 use sim_host::chaos::extrema::Extrema;
 use sim_host::chaos::period::{Period, period_of_maxima};

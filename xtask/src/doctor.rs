@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use crate::setup::{python, qemu, target};
+use crate::setup::{probe, python, qemu, target};
 use crate::{rustup, workspace};
 
 /// One thing that is needed.
@@ -61,7 +61,7 @@ fn target() -> Result<Item> {
         }
     };
     Ok(Item {
-        need: target::TARGET.to_owned(),
+        need: probe::TARGET.to_owned(),
         state,
     })
 }

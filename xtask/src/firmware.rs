@@ -6,7 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::setup::target::TARGET;
+use crate::setup::probe::TARGET;
 use crate::{process, rustup, workspace};
 
 /// The board that everything runs on unless it is told otherwise. Its images are where a plain `cargo build` puts them.

@@ -1,6 +1,7 @@
 //! Makes this machine ready: the compiler's target, QEMU, and for the tests Python packages.
 
 mod debian;
+pub mod probe;
 pub mod python;
 pub mod qemu;
 pub mod target;

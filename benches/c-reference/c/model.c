@@ -1,4 +1,4 @@
-/* The vehicle model's step: shared-model/src/integrate.rs, vehicle.rs, tire.rs and friction.rs. */
+/* The vehicle model's step: shared-model/src/integrate.rs, vehicle/model.rs, tire.rs and friction.rs. */
 
 #include "reference.h"
 

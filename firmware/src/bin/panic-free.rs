@@ -9,7 +9,7 @@
 
 use core::panic::PanicInfo;
 use core::ptr::read_volatile;
-use firmware::tasks::{self, ControlInterrupt, PwmInterrupt};
+use firmware::interrupts::{self, ControlInterrupt, PwmInterrupt};
 
 // SAFETY: there is no such function; where it is called, the link fails.
 unsafe extern "C" {
@@ -31,7 +31,7 @@ extern "C" fn main() -> ! {
     };
     #[cfg(feature = "reachable-panic")]
     assert!(!matches!(control, ControlInterrupt::InLoop(_)), "provoked");
-    tasks::hand_over(pwm, control, 10);
+    interrupts::hand_over(pwm, control, 10);
     loop {
         cortex_m::asm::wfi();
     }

@@ -197,9 +197,9 @@ fn lower<T: Real>(a: T, b: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::controller::Policy;
     use crate::gate::Limits;
     use crate::parameter::ParameterSet;
+    use crate::policy::Policy;
     use crate::signal::Mode;
 
     const CLOCK_HZ: u32 = 25_000_000;

@@ -2,8 +2,8 @@
 //! is refused by name and not by a safe state at some later time.
 
 use crate::dither::Waveform;
+use crate::ecu_schedule::Table;
 use crate::parameter::OutOfRange;
-use crate::schedule::Table;
 use crate::{Real, Scenario};
 
 /// What a number may be off by the rounding of f32; the gate's own limits have the same room.

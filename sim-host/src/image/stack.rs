@@ -13,7 +13,7 @@
 //!   Addresses that are computed by arithmetic would be missed; neither the compiler nor this project makes any.
 //! * Recursion, and code whose use of the stack nobody states, have no bound: they are problems, and the proof fails.
 //! * Levels are exceptions of different priority, as the firmware sets them. That an exception does not interrupt one of
-//!   its own level is the core's property, that the priorities are as here is the firmware's (`firmware/src/app.rs`).
+//!   its own level is the core's property, that the priorities are as here is the firmware's (`firmware/src/interrupts.rs`).
 
 use super::AnalysisError;
 use super::call_graph::{CallGraph, Function};

@@ -10,7 +10,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use super::target::{self, TARGET};
+use super::probe::{TARGET, builds};
 use crate::host::{self, Apt};
 use crate::{process, rustup, workspace};
 
@@ -33,7 +33,7 @@ pub fn install(pinned: &str) -> Result<()> {
     install_packages(pinned)?;
     let folder = folder()?;
     // The libraries may be there, and only rustup not know them; or they may belong to an older compiler.
-    if !target::builds(Command::new(folder.join("bin/rustc")))? {
+    if !builds(Command::new(folder.join("bin/rustc")))? {
         build(pinned, &folder)?;
     }
     println!(
