@@ -8,13 +8,7 @@ use anyhow::{Result, bail};
 use crate::process;
 
 /// The package managers with a line to type, in the order they are looked for.
-const MANAGERS: [Manager; 5] = [
-    Manager::Apt,
-    Manager::Dnf,
-    Manager::Pacman,
-    Manager::Brew,
-    Manager::Winget,
-];
+const MANAGERS: [Manager; 3] = [Manager::Apt, Manager::Dnf, Manager::Pacman];
 
 /// A package manager.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,10 +19,6 @@ pub enum Manager {
     Dnf,
     /// Arch.
     Pacman,
-    /// macOS.
-    Brew,
-    /// Windows.
-    Winget,
 }
 
 impl Manager {
@@ -44,8 +34,6 @@ impl Manager {
             Self::Apt => "apt-get",
             Self::Dnf => "dnf",
             Self::Pacman => "pacman",
-            Self::Brew => "brew",
-            Self::Winget => "winget",
         }
     }
 
@@ -55,8 +43,6 @@ impl Manager {
             Self::Apt => "sudo apt-get update && sudo apt-get install python3-venv",
             Self::Dnf => "sudo dnf install python3",
             Self::Pacman => "sudo pacman -S python",
-            Self::Brew => "brew install python",
-            Self::Winget => "winget install Python.Python.3.13",
         }
     }
 
@@ -68,8 +54,6 @@ impl Manager {
             }
             Self::Dnf => "sudo dnf install arm-none-eabi-gcc-cs arm-none-eabi-newlib",
             Self::Pacman => "sudo pacman -S arm-none-eabi-gcc arm-none-eabi-newlib",
-            Self::Brew => "brew install --cask gcc-arm-embedded",
-            Self::Winget => "winget install Arm.GnuArmEmbeddedToolchain",
         }
     }
 
@@ -81,10 +65,6 @@ impl Manager {
             }
             Self::Dnf => "sudo dnf install qemu-system-arm",
             Self::Pacman => "sudo pacman -S qemu-system-arm",
-            Self::Brew => "brew install qemu",
-            Self::Winget => {
-                "winget install SoftwareFreedomConservancy.QEMU (and add its folder to PATH)"
-            }
         }
     }
 }

@@ -99,9 +99,8 @@ pub fn capture(command: &mut Command) -> Option<String> {
 
 /// The full path of a program on PATH.
 pub fn find(program: &str) -> Option<PathBuf> {
-    let name = format!("{program}{}", env::consts::EXE_SUFFIX);
     env::split_paths(&env::var_os("PATH")?)
-        .map(|folder| folder.join(&name))
+        .map(|folder| folder.join(program))
         .find(|path| path.is_file())
 }
 

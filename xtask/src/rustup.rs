@@ -16,10 +16,7 @@ fn program() -> Option<PathBuf> {
     let home = env::var_os("CARGO_HOME")
         .map(PathBuf::from)
         .or_else(|| Some(env::home_dir()?.join(".cargo")));
-    let usual = home.map(|home| {
-        home.join("bin")
-            .join(format!("rustup{}", env::consts::EXE_SUFFIX))
-    });
+    let usual = home.map(|home| home.join("bin").join("rustup"));
     usual
         .filter(|path| path.is_file())
         .or_else(|| process::find("rustup"))

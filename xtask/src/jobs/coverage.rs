@@ -1,7 +1,6 @@
 //! `cargo xtask coverage`: every line of the gate is run by a test of the model.
 
 use std::collections::BTreeMap;
-use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -68,10 +67,9 @@ impl Llvm {
             .join("bin");
         let package = PathBuf::from(format!("/usr/lib/llvm-{major}/bin"));
         for folder in [component, package] {
-            let program = |name| folder.join(format!("{name}{}", env::consts::EXE_SUFFIX));
             let found = Self {
-                profdata: program("llvm-profdata"),
-                cov: program("llvm-cov"),
+                profdata: folder.join("llvm-profdata"),
+                cov: folder.join("llvm-cov"),
             };
             if found.profdata.is_file() && found.cov.is_file() {
                 return Ok(found);

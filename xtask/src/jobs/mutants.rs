@@ -53,8 +53,7 @@ pub fn run() -> Result<()> {
 }
 
 fn program(tools: &Path) -> PathBuf {
-    let name = format!("{TOOL}{}", std::env::consts::EXE_SUFFIX);
-    tools.join("bin").join(name)
+    tools.join("bin").join(TOOL)
 }
 
 fn ensure(pinned: &str, tools: &Path) -> Result<()> {

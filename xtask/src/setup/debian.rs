@@ -4,7 +4,8 @@
 //! a folder that rustup then knows as one more toolchain. Nothing in rustup's own toolchains changes.
 
 use std::env;
-use std::fs;
+use std::fs::{self, Permissions};
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -233,17 +234,13 @@ fn replace(new: &Path, place: &Path) -> Result<()> {
     fs::rename(new, place).with_context(|| format!("cannot create {}", place.display()))
 }
 
-/// A symbolic link, by a program: this file must compile on Windows too, where it is never used.
 fn link(to: &Path, at: &Path) -> Result<()> {
-    let done = process::capture(Command::new("ln").arg("-s").arg(to).arg(at));
-    done.map(|_| ())
-        .with_context(|| format!("cannot create {}", at.display()))
+    symlink(to, at).with_context(|| format!("cannot create {}", at.display()))
 }
 
 fn script(path: &Path, line: &str) -> Result<()> {
     fs::write(path, format!("#!/bin/sh\n{line}\n"))?;
-    let done = process::capture(Command::new("chmod").arg("755").arg(path));
-    done.map(|_| ())
+    fs::set_permissions(path, Permissions::from_mode(0o755))
         .with_context(|| format!("cannot make {} executable", path.display()))
 }
 

@@ -106,15 +106,12 @@ fn stamp() -> Result<PathBuf> {
 }
 
 fn program(folder: &Path) -> PathBuf {
-    match cfg!(windows) {
-        true => folder.join("Scripts").join("python.exe"),
-        false => folder.join("bin").join("python"),
-    }
+    folder.join("bin").join("python")
 }
 
-/// The machine's Python 3. Windows has no `python3` but a stub that opens a shop.
+/// The machine's Python 3.
 fn system() -> Option<PathBuf> {
-    process::find(if cfg!(windows) { "python" } else { "python3" })
+    process::find("python3")
 }
 
 /// Whether there is a Python that can make virtual environments with pip in them.
