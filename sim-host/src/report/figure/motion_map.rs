@@ -9,6 +9,7 @@ use crate::map::cell::{Cell, Kind};
 use crate::map::plan::{Plan, Sheet, Start};
 use plotters::prelude::{Color, RGBColor, Rectangle};
 use shared_model::dither::Waveform;
+use shared_model::listed;
 
 const PANEL_HEIGHT: u32 = 440;
 const TICKS_ACROSS: usize = 6;
@@ -26,25 +27,17 @@ const BEYOND: f64 = 0.002;
 /// Periods with a shade of their own.
 const PERIODS: u32 = 4;
 
-/// What a row of panels shows.
-#[derive(Clone, Copy)]
-enum Shown {
-    Exponent,
-    Period,
-    YawRate,
+listed! {
+    /// What a row of panels shows.
+    #[derive(Clone, Copy)]
+    enum Shown {
+        Exponent => "exponent (1/s)",
+        Period => "period",
+        YawRate => "yaw rate (rad/s)",
+    }
 }
 
 impl Shown {
-    const ALL: [Self; 3] = [Self::Exponent, Self::Period, Self::YawRate];
-
-    fn caption(self) -> &'static str {
-        match self {
-            Self::Exponent => "exponent (1/s)",
-            Self::Period => "period",
-            Self::YawRate => "yaw rate (rad/s)",
-        }
-    }
-
     fn number(self, cell: &Cell) -> Option<f64> {
         match self {
             Self::Exponent => shown_exponent(cell),
@@ -214,7 +207,7 @@ fn draw_row(
     for ((sheet, cells), area) in sheets.iter().zip(panels.split_evenly((1, sheets.len()))) {
         let (x, y) = axes(plan, sheet);
         let (from, to) = ((x.low, y.low), (x.high, y.high));
-        let caption = format!("{}: {}", name(sheet), shown.caption());
+        let caption = format!("{}: {}", name(sheet), shown.name());
         let panel = Panel::new(&area, (&caption, ""), x, y)?;
         panel.block(from, to, place(rasters.len()))?;
         let colour = |cell: &Cell| match &scale {
