@@ -1,9 +1,9 @@
-//! Puts the board's memory map where the linker finds it, and asks for the linker scripts.
+//! Puts the board's memory map where the linker finds it, and selects the linker scripts.
 
 use std::path::PathBuf;
 use std::{env, fs};
 
-/// What cargo puts in front of the name of a board whose feature is on.
+/// Prefix of cargo's variable for a board whose feature is on.
 const BOARD_FEATURE: &str = "CARGO_FEATURE_BOARD_";
 
 fn main() {

@@ -51,8 +51,8 @@ fn count(settings: &str) -> BTreeMap<(String, String), Counted> {
 
 /// `... cost FUNCTION LANGUAGE name number name number ...`
 fn cost(line: &str) -> Option<((String, String), Counted)> {
-    let (_, told) = line.split_once(" cost ")?;
-    let mut words = told.split_whitespace();
+    let (_, figures) = line.split_once(" cost ")?;
+    let mut words = figures.split_whitespace();
     let call = (words.next()?.to_owned(), words.next()?.to_owned());
     let mut counted = Counted::new();
     while let (Some(name), Some(number)) = (words.next(), words.next()) {
@@ -93,7 +93,7 @@ fn rust_takes_no_more_instructions_than_c() {
         println!("{:36} {:>6} {}", figure.name, figure.value, figure.unit);
     }
     let about = "Instructions (no cycles) of a call on the board mps2: Rust, the same in C, and the greatest of the three ratios.\n\
-         Scenarios: no dither, square wave, sine. docs/cost.md says what is counted.";
+         Scenarios: no dither, square wave, sine. docs/cost.md describes the count.";
     let compilers = format!("{}; {c_compiler}", image(IMAGE).compiler);
     check_figures("cost.txt", about, &compilers, &figures);
 }

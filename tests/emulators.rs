@@ -1,5 +1,5 @@
-//! Programs that are called as the emulator and are none, or fail as one may: the host neither believes nor waits for them, and
-//! leaves nothing of them behind.
+//! Programs that are called as the emulator and are none, or fail as one may: the host neither believes nor waits for
+//! them, and leaves nothing of them behind.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -241,7 +241,7 @@ fn an_image_without_symbols_runs_without_log() {
     assert_eq!(code, Some(0), "{message}");
     assert_eq!(output.stdout, b"", "no raw bytes");
     assert!(message.contains("no defmt symbols"), "{message}");
-    // Nobody can say whether this run is complete.
+    // It is unknown whether this run is complete.
     let in_loop = ["pil", "--time", "0.1", "--firmware", "stripped"];
     assert_could_not_run(run(&real, &in_loop), &["no defmt symbols"]);
     let verify = ["verify", "--out", "report", "--firmware", "stripped"];

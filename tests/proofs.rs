@@ -1,4 +1,4 @@
-//! What is shown of the firmware's images: worst stack, size, instructions of the tasks, spacing of interrupts.
+//! Proofs about the firmware's images: worst stack, size, instructions of the tasks, jitter of the interrupts.
 
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
@@ -243,7 +243,7 @@ fn instructions_per_tick() {
 const INTERRUPTS: f32 = 1e5;
 
 #[test]
-fn spacing_of_interrupts() {
+fn jitter_of_interrupts() {
     let mut figures = Vec::new();
     for pwm_rate_hz in [10_000.0, 20_000.0, 50_000.0_f32] {
         let mut scenario = scenario(Waveform::Sine, Application::Averaged);
@@ -252,8 +252,8 @@ fn spacing_of_interrupts() {
         let recording = record(&scenario, Machine::Mps2An386, 0);
         assert!(recording.duties.len() as f32 >= INTERRUPTS);
         let (least, most) = (
-            recording.trailer.least_spacing,
-            recording.trailer.most_spacing,
+            recording.trailer.min_interval,
+            recording.trailer.max_interval,
         );
         let nominal = f32::from(recording.header.pwm_period);
         assert!(

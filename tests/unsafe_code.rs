@@ -22,9 +22,9 @@ const REASON: &str = "SAFETY:";
 struct Use {
     /// Line, from 1.
     line: usize,
-    /// What is unsafe.
+    /// Kind of the unsafe code.
     kind: &'static str,
-    /// Why it is sound; `None` where nobody says.
+    /// Why it is sound; `None` without a comment.
     reason: Option<String>,
 }
 

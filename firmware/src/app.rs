@@ -42,7 +42,7 @@ fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>) -> ExitCode {
         Err(error) => return refuse_scenario(&error),
     };
     defmt::info!(
-        "run of {=f32} s at {=f32} rpm, {=f32} model steps a second",
+        "run of {=f32} s at {=f32} rpm, {=f32} model steps per second",
         scenario.run.duration_s,
         scenario.run.wheel_speed_rpm,
         scenario.model_rate_hz()

@@ -1,5 +1,5 @@
-//! The ECU in the loop: sensor frames come over the link, duty codes and actuator frames go out on it, and the host moves the
-//! vehicle in between.
+//! The ECU in the loop: sensor frames come over the link, duty codes and actuator frames go out on it, and the host moves
+//! the vehicle in between.
 
 use crate::board::{Board, Current};
 use crate::exit::ExitCode;
@@ -19,13 +19,13 @@ static OUTPUT: Mutex<Cell<Option<ControlOutput<f32>>>> = Mutex::new(Cell::new(No
 static CONTROL_COST: AtomicU16 = AtomicU16::new(0);
 static CONTROL_TICKS: AtomicU32 = AtomicU32::new(0);
 
-/// What the PWM interrupt works on.
+/// State of the PWM interrupt.
 pub struct PwmInterrupt {
     /// The program.
     pub task: PwmTask<f32>,
     /// The servo's PWM.
     pub pwm: <Current as Board>::Pwm,
-    /// Servo and sensors, which the host stands in for.
+    /// Servo and sensors, simulated by the host.
     pub link: Link,
     /// The sensor frame that came since the last control tick.
     pub frame: Option<FrameBytes>,
@@ -35,7 +35,7 @@ pub struct PwmInterrupt {
     pub nominal_counts: u32,
 }
 
-/// What the control interrupt works on.
+/// State of the control interrupt.
 pub struct ControlInterrupt {
     /// The program.
     pub task: ControlTask<f32>,
@@ -122,12 +122,12 @@ pub fn control_ticks() -> u32 {
 
 // Functions of their own, so that the two have names in the image: faults are injected there.
 
-/// The PWM interrupt's task in its place in memory; `None` at a second call.
+/// The PWM interrupt's task in its place in memory; `None` at the second call.
 pub fn place_pwm(interrupt: PwmInterrupt) -> Option<&'static mut PwmInterrupt> {
     cortex_m::singleton!(: PwmInterrupt = interrupt)
 }
 
-/// The control interrupt's task in its place in memory; `None` at a second call.
+/// The control interrupt's task in its place in memory; `None` at the second call.
 pub fn place_control(interrupt: ControlInterrupt) -> Option<&'static mut ControlInterrupt> {
     cortex_m::singleton!(: ControlInterrupt = interrupt)
 }

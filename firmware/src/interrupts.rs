@@ -5,7 +5,7 @@
 //! at work. Nothing here can panic: the binary `panic-free` proves it at link time.
 
 use crate::board::{Board, Current};
-use crate::{clock, counters, in_loop, open_loop, spacing, tasks};
+use crate::{clock, counters, in_loop, jitter, open_loop, tasks};
 use core::cell::Cell;
 use cortex_m::peripheral::SCB;
 use cortex_m::peripheral::scb::SystemHandler;
@@ -50,7 +50,7 @@ pub fn start(
     let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * tick_s) as u32;
     let samples_per_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
     critical_section::with(|_| {
-        // Started once and with a period that the scenario's check has passed.
+        // Started once, with a period that the scenario's check allows.
         let pwm = Current::start_pwm(period).ok();
         if let Some((pwm, control)) = pwm.and_then(tasks) {
             hand_over(pwm, control, samples_per_ms);
@@ -85,7 +85,7 @@ fn SysTick() {
     if INTERRUPT.is_none() {
         *INTERRUPT = critical_section::with(|cs| PWM_START.borrow(cs).take());
     }
-    spacing::note(clock::count_sample(), start);
+    jitter::record(clock::count_sample(), start);
     match INTERRUPT {
         Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),

@@ -1,32 +1,32 @@
-//! Time between the PWM's interrupts, by a counter that is not their clock.
+//! Jitter of the PWM interrupt: the interval from one to the next, by a counter that is not their clock.
 
 use core::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 static LAST: AtomicU32 = AtomicU32::new(0);
-static LEAST: AtomicU32 = AtomicU32::new(u32::MAX);
-static MOST: AtomicU32 = AtomicU32::new(0);
+static MIN: AtomicU32 = AtomicU32::new(u32::MAX);
+static MAX: AtomicU32 = AtomicU32::new(0);
 
-/// Interrupts whose distance from the one before is not counted: the first has none, and the start of the program holds it up, so
-/// that the second follows early.
+/// Interrupts whose interval does not count: the first has none, and the start of the program delays it, so that the second
+/// follows early.
 const UNCOUNTED: u32 = 2;
 
-/// The interrupt with that `index`, from 0, came at `now`, counts. Only that interrupt calls this, so reading and writing need not
-/// be one.
-pub fn note(index: u32, now: u32) {
-    let spacing = now.wrapping_sub(LAST.load(Relaxed));
+/// Records the interrupt with that `index`, from 0, at the counter's value `now`. Only that interrupt calls this, so reading
+/// and writing need not be one operation.
+pub fn record(index: u32, now: u32) {
+    let interval = now.wrapping_sub(LAST.load(Relaxed));
     LAST.store(now, Relaxed);
     if index < UNCOUNTED {
         return;
     }
-    if spacing < LEAST.load(Relaxed) {
-        LEAST.store(spacing, Relaxed);
+    if interval < MIN.load(Relaxed) {
+        MIN.store(interval, Relaxed);
     }
-    if spacing > MOST.load(Relaxed) {
-        MOST.store(spacing, Relaxed);
+    if interval > MAX.load(Relaxed) {
+        MAX.store(interval, Relaxed);
     }
 }
 
-/// Least and most counts from one interrupt to the next; the first above the second before there were enough.
-pub fn extremes() -> (u32, u32) {
-    (LEAST.load(Relaxed), MOST.load(Relaxed))
+/// Shortest and longest interval, counts; the first is above the second while there is none.
+pub fn interval_range() -> (u32, u32) {
+    (MIN.load(Relaxed), MAX.load(Relaxed))
 }

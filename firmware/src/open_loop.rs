@@ -12,7 +12,7 @@ use shared_model::telemetry::Record;
 /// The dither sample that the PWM holds, as bits.
 static DITHER_BITS: AtomicU32 = AtomicU32::new(0);
 
-/// What the PWM interrupt works on.
+/// State of the PWM interrupt.
 pub struct PwmInterrupt {
     /// The program.
     pub task: PwmTask<f32>,
@@ -22,7 +22,7 @@ pub struct PwmInterrupt {
     pub recording: DutyRecording,
 }
 
-/// What the control interrupt works on.
+/// State of the control interrupt.
 pub struct ControlInterrupt {
     /// The program.
     pub task: ControlTask<f32>,

@@ -4,7 +4,7 @@ use crate::board::{Board, Current};
 use crate::counters::{count_overrun, overruns, saturate};
 use crate::exit::ExitCode;
 use crate::host_file::{HostFile, HostFileError};
-use crate::{spacing, stack};
+use crate::{jitter, stack};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use critical_section::Mutex;
@@ -64,7 +64,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// The rings, and the stream if there is a `path`, with its header written. `None` if called a second time.
+    /// The rings, and the stream if there is a `path`, with its header written. `None` at the second call.
     ///
     /// # Errors
     /// If the host cannot write the file.
@@ -127,7 +127,7 @@ impl Recorder {
         Ok(true)
     }
 
-    /// Writes what is gathered.
+    /// Writes the gathered bytes.
     ///
     /// # Errors
     /// If the host cannot write the file.
@@ -141,8 +141,8 @@ impl Recorder {
     }
 }
 
-/// Writes the trailer, if a stream is open. Works from any handler: it needs no recorder, and what the recorder has
-/// gathered and not written is lost.
+/// Writes the trailer, if a stream is open. Works from any handler: it needs no recorder; bytes that the recorder has
+/// gathered and not written are lost.
 ///
 /// # Errors
 /// If the host cannot write the file.
@@ -152,7 +152,7 @@ pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
         return Ok(());
     }
     let (final_duty, neutral_duty) = Current::pwm_output();
-    let (least_spacing, most_spacing) = spacing::extremes();
+    let (min_interval, max_interval) = jitter::interval_range();
     let trailer = Trailer {
         exit_code: code as u32,
         records: RECORDS.load(Ordering::Relaxed),
@@ -160,8 +160,8 @@ pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
         stack_bytes: stack::deepest_bytes(),
         final_duty,
         neutral_duty,
-        least_spacing: saturate(least_spacing),
-        most_spacing: saturate(most_spacing),
+        min_interval: saturate(min_interval),
+        max_interval: saturate(max_interval),
     };
     let mut bytes = [0; TRAILER_LEN];
     trailer.encode(&mut bytes);

@@ -3,7 +3,7 @@
 use crate::board::{Board, Current};
 use crate::command_line::CommandError;
 use crate::exit::ExitCode;
-use shared_model::stability::{MOST_STEP_TIMES_RATE, least_rate_hz};
+use shared_model::stability::{MAX_STEP_TIMES_RATE, min_rate_hz};
 use shared_model::{InvalidScenario, MAX_RATIO};
 
 /// For a command line that cannot be read, or a word of it that is no setting.
@@ -80,8 +80,8 @@ pub fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             1.0 / rate_hz,
             fastest_rate_per_s,
             fastest_rate_per_s / rate_hz,
-            MOST_STEP_TIMES_RATE,
-            least_rate_hz(fastest_rate_per_s)
+            MAX_STEP_TIMES_RATE,
+            min_rate_hz(fastest_rate_per_s)
         ),
     }
     ExitCode::BadScenario

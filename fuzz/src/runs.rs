@@ -97,8 +97,8 @@ fn stream(samples_per_step: u16, records: u32) -> Vec<u8> {
         stack_bytes: 3020,
         final_duty: 1250,
         neutral_duty: 1250,
-        least_spacing: 2500,
-        most_spacing: 2500,
+        min_interval: 2500,
+        max_interval: 2500,
     };
     let mut bytes = vec![0; HEADER_LEN];
     header.encode(&mut bytes);

@@ -7,7 +7,7 @@ use crate::policy::Policy;
 use crate::scenario::Scenario;
 use crate::signal::Measurement;
 
-/// What the controller asks for until the next control tick.
+/// Command of the controller until the next control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command<T> {
     /// Motor's share of the servo voltage, V.
@@ -16,7 +16,7 @@ pub struct Command<T> {
     pub dither_amplitude_v: T,
 }
 
-/// The controller, run once a control tick.
+/// The controller, run once per control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Controller<T> {
     policy: Policy<T>,

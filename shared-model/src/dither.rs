@@ -56,7 +56,7 @@ parameters! {
         square_frequency_rad_per_s: 1.0..=1e6,
         /// Angular frequency of the sine, rad/s.
         sine_frequency_rad_per_s: 1.0..=1e6,
-        /// Time at which the dither sets in, s.
+        /// Start time of the dither, s.
         start_time_s: 0.0..=1e5,
         /// Angle that one volt of square wave adds ahead of the nonlinearities, rad/V. The paper uses volts as an angle and
         /// gives no conversion.
@@ -105,7 +105,7 @@ impl<T: Real> Dither<T> {
         self.amplitude_v * rad_per_volt
     }
 
-    /// What the nonlinearities see once the dither is on: the mean over its period, or `sample` (in units of the
+    /// Effect on the nonlinearities once the dither is on: the mean over its period, or `sample` (in units of the
     /// amplitude) held over one step.
     pub fn injection(&self, sample: T) -> Injection<T> {
         let amplitude = self.amplitude_rad();
@@ -120,7 +120,7 @@ impl<T: Real> Dither<T> {
     }
 }
 
-/// What the dither does to the argument of a nonlinearity during one step.
+/// Effect of the dither on the argument of a nonlinearity during one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Injection<T> {
     /// Nothing.
@@ -165,8 +165,8 @@ impl<T: Real> Injection<T> {
     }
 }
 
-/// Number of Gauss-Chebyshev nodes. They hold the mean of the Magic Formula of set A to 1e-6 of its peak up to an amplitude of
-/// 0.2 rad (the paper's largest is 0.19 rad), and to 2e-5 up to 0.3 rad.
+/// Number of Gauss-Chebyshev nodes. They hold the mean of the Magic Formula of set A to 1e-6 of its peak up to an
+/// amplitude of 0.2 rad (the paper's largest is 0.19 rad), and to 2e-5 up to 0.3 rad.
 const NODES: usize = 32;
 
 /// Mean of a function over a sine, equation (23), by Gauss-Chebyshev quadrature.
@@ -224,7 +224,7 @@ impl<T: Real> Default for SineMean<T> {
     }
 }
 
-/// Phase accumulator and waveform: one sample a PWM period.
+/// Phase accumulator and waveform: one sample per PWM period.
 ///
 /// The phase counts 2^-32 turns in an integer, so it neither drifts nor differs between machines. The frequency is met
 /// to half a count, 2^-33 of the sample rate.
@@ -250,18 +250,18 @@ impl Oscillator {
         }
     }
 
-    /// Angular frequency that the integer phase really has at `rate_hz`, rad/s.
+    /// Actual angular frequency of the integer phase at `rate_hz`, rad/s.
     pub fn frequency_rad_per_s(&self, rate_hz: f64) -> f64 {
         f64::from(self.increment) / COUNTS_PER_TURN * rate_hz * core::f64::consts::TAU
     }
 
-    /// The sample at the present phase, from -1 to 1 (0 without dither); then the phase moves on.
+    /// The sample at the present phase, from -1 to 1 (0 without dither); then the phase advances.
     ///
     /// ```
     /// use shared_model::{Scenario, dither::{Oscillator, Waveform}};
     /// let mut dither = Scenario::<f64>::reconstruction().dither;
     /// dither.waveform = Waveform::Sine;
-    /// // A quarter turn a sample.
+    /// // A quarter turn per sample.
     /// let rate_hz = 4000.0 / core::f64::consts::TAU * 4.0;
     /// let mut oscillator = Oscillator::new(&dither, rate_hz);
     /// let samples: [f64; 4] = core::array::from_fn(|_| oscillator.sample());

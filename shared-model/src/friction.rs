@@ -1,5 +1,5 @@
-//! Dry friction of the steering: Coulomb friction on the steering rate with true stick, and the law as the paper prints
-//! it.
+//! Dry friction of the steering: Coulomb friction on the steering rate with true stick, and the law as printed in the
+//! paper.
 
 use crate::Real;
 use crate::dither::Injection;
@@ -10,7 +10,7 @@ use crate::parameter::parameters;
 const GRAVITY_M_PER_S2: f64 = 9.8;
 
 listed! {
-    /// What the friction torque depends on.
+    /// The quantity that the friction torque depends on.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
     #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -30,7 +30,7 @@ parameters! {
     /// Parameters of the steering's dry friction.
     pub struct Friction {
         choices {
-            /// What the torque depends on.
+            /// The quantity that the torque depends on.
             law: FrictionLaw,
             /// Whether the dither also acts ahead of the friction's sign function. On the steering angle it adds W; on the
             /// steering rate it adds W times the dither's angular frequency, which all but removes the friction.
@@ -176,8 +176,7 @@ impl<T: Real> Sign<T> {
         }
     }
 
-    /// The first step that the argument passes on its way to `argument` when it comes from `mode`, and the mode behind
-    /// it.
+    /// The first step that the argument passes on its way to `argument` when it comes from `mode`, and the mode after it.
     pub fn crossing(&self, mode: FrictionMode, argument: T) -> Option<(T, FrictionMode)> {
         use FrictionMode::{Negative, Neutral, Positive};
         let Self::Stepped { lower, upper } = *self else {

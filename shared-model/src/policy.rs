@@ -5,15 +5,15 @@ use crate::parameter::parameters;
 
 parameters! {
     section "policy";
-    /// When the dither is on, and how fast commands may move.
+    /// Policy of the controller: when the dither is on, and how fast commands may change.
     pub struct Policy {
         /// Wheel speed below which there is no dither, rpm.
         dither_off_below_rpm: 0.0..=1e5,
-        /// The dither comes on again this much above that speed, rpm.
+        /// Margin above that speed at which the dither is switched on again, rpm.
         hysteresis_rpm: 0.0..=1e4,
         /// Time in which the schedule's greatest amplitude comes in and goes out, s.
         dither_ramp_s: 1e-3..=100.0,
-        /// Greatest motor current that a request gets, A.
+        /// Greatest motor current in answer to a request, A.
         motor_current_a: 0.0..=1000.0,
         /// Greatest change of the motor current, A/s.
         motor_slew_a_per_s: 1e-3..=1e6,

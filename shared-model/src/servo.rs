@@ -139,7 +139,7 @@ impl<T: Real> Pwm<T> {
         let code = if counts >= top {
             self.period
         } else if counts >= T::zero() {
-            // Below the period, so it fits; the least of the two all the same, for a proof that needs no reasoning.
+            // Below the period, so it fits; the minimum makes that evident to the compiler.
             let rounded = (counts + T::from_f64(0.5)).to_u32();
             rounded.min(self.period.into()) as u16
         } else if counts < T::zero() {

@@ -1,4 +1,4 @@
-//! Scenarios as text, one `section.name=value` a setting: how a scenario reaches the ECU without a rebuild.
+//! Scenarios as text, one setting `section.name=value` per word: they reach the ECU without a rebuild.
 
 use crate::Real;
 use crate::dither::{Application, Dither, Waveform};
@@ -57,7 +57,7 @@ impl Choice for bool {
     }
 }
 
-/// Why a setting was not taken.
+/// Reason why a setting was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SettingError {
     /// Not of the form `key=value`.
@@ -71,7 +71,7 @@ pub enum SettingError {
 }
 
 impl SettingError {
-    /// What is wrong, in words.
+    /// The reason in words.
     pub fn reason(self) -> &'static str {
         match self {
             Self::NoEqualsSign => "must be key=value",
@@ -147,7 +147,7 @@ impl<T: Real + FromStr> Scenario<T> {
     fn set_number(&mut self, key: &str, value: &str) -> Result<(), SettingError> {
         let (section, name) = key.rsplit_once('.').ok_or(SettingError::UnknownKey)?;
         let parsed = value.parse();
-        // The key is looked at first: a misspelt choice, whose value is no number, is an unknown key all the same.
+        // The key is checked first: a misspelt choice, whose value is no number, is reported as an unknown key.
         let mut changed = *self;
         let number = parsed.as_ref().map_or(T::zero(), |&number| number);
         let known = match section {

@@ -1,9 +1,9 @@
-//! What passes between vehicle and ECU: measurements in, the actuation's state out.
+//! Signals between vehicle and ECU: measurements in, the actuation's state out.
 
 use crate::Real;
 use crate::listed;
 
-/// What the sensors tell, once a control tick.
+/// Measurements of the sensors, once per control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement<T> {
     /// Wheel speed N, rpm.
@@ -14,7 +14,7 @@ pub struct Measurement<T> {
     pub steering_angle_rad: T,
     /// Steering rate, rad/s.
     pub steering_rate_rad_per_s: T,
-    /// Motor current that the driver asks for, A.
+    /// Motor current that the driver requests, A.
     pub current_request_a: T,
 }
 
@@ -32,7 +32,7 @@ impl<T: Real> Measurement<T> {
 }
 
 listed! {
-    /// What the ECU is doing.
+    /// Operating mode of the ECU.
     #[derive(Debug, Clone, Copy, PartialEq, Eq)]
     #[repr(u8)]
     pub enum Mode {
@@ -52,10 +52,10 @@ impl Mode {
     }
 }
 
-/// What the ECU tells the vehicle, once a control tick.
+/// The ECU's report to the vehicle, once per control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Actuation<T> {
-    /// What the ECU is doing.
+    /// Operating mode of the ECU.
     pub mode: Mode,
     /// Faults that put the ECU into its safe state, one bit each; see `gate::Fault`.
     pub faults: u32,

@@ -5,10 +5,10 @@ use crate::dither::Application;
 use crate::parameter::{OutOfRange, ParameterSet};
 use crate::scenario::Scenario;
 use crate::short::Short;
-use crate::stability::{MOST_STEP_TIMES_RATE, fastest_rate_per_s, least_rate_hz};
+use crate::stability::{MAX_STEP_TIMES_RATE, fastest_rate_per_s, min_rate_hz};
 use core::fmt;
 
-/// One step, less what rounding to f32 can take from it.
+/// One step, less the rounding to f32.
 const ALMOST_ONE: f64 = 1.0 - 1e-6;
 /// Most PWM samples in a model step; a telemetry record holds them all.
 pub const MAX_RATIO: u32 = 1000;
@@ -16,7 +16,7 @@ pub const MAX_RATIO: u32 = 1000;
 const MAX_SAMPLES: f64 = 4e9;
 
 impl<T: Real> Scenario<T> {
-    /// Checks every number, and that the numbers fit together.
+    /// Checks every number, and that the numbers are consistent.
     ///
     /// # Errors
     /// The first fault found.
@@ -50,7 +50,7 @@ impl<T: Real> Scenario<T> {
     fn validate_step(&self) -> Result<(), InvalidScenario> {
         let rate_hz = self.model_rate_hz().to_f64();
         let fastest_rate_per_s = fastest_rate_per_s(self);
-        if fastest_rate_per_s <= MOST_STEP_TIMES_RATE * rate_hz {
+        if fastest_rate_per_s <= MAX_STEP_TIMES_RATE * rate_hz {
             return Ok(());
         }
         Err(InvalidScenario::StepTooLong {
@@ -113,7 +113,7 @@ impl<T: Real> Scenario<T> {
     }
 }
 
-/// Why a scenario cannot be run.
+/// Reason why a scenario cannot be run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum InvalidScenario {
     /// A number is not finite or not in its range.
@@ -127,26 +127,26 @@ pub enum InvalidScenario {
     },
     /// The carrier period does not fit the timer.
     TimerPeriod {
-        /// Period asked for, counts.
+        /// The requested period, counts.
         counts: u32,
     },
     /// The run is shorter than one step or longer than the counters.
     Duration {
-        /// Length asked for, s.
+        /// The requested length, s.
         duration_s: f64,
         /// Least length, s.
         min_s: f64,
         /// Greatest length, s.
         max_s: f64,
     },
-    /// The dither is faster than half the PWM rate, so its samples would show another frequency.
+    /// The dither is faster than half the PWM rate, so its samples would have another frequency (aliasing).
     DitherFrequency {
-        /// Frequency asked for, rad/s.
+        /// The requested frequency, rad/s.
         frequency_rad_per_s: f64,
         /// Greatest frequency at the PWM rate, rad/s.
         max_rad_per_s: f64,
     },
-    /// Motor and dither together ask for more than the bus has.
+    /// Motor and dither together exceed the bus voltage.
     OverVoltage {
         /// Voltage of the motor current, V.
         motor_v: f64,
@@ -167,7 +167,7 @@ pub enum InvalidScenario {
 }
 
 impl InvalidScenario {
-    /// Voltage that the motor leaves for the dither, V.
+    /// Voltage available for the dither beside the motor's, V.
     pub fn left_for_dither_v(motor_v: f64, bus_v: f64) -> f64 {
         (bus_v - motor_v.abs()).max(0.0)
     }
@@ -233,14 +233,14 @@ impl fmt::Display for InvalidScenario {
                 rate_hz,
                 fastest_rate_per_s,
             } => {
-                let least_hz = least_rate_hz(fastest_rate_per_s);
+                let min_hz = min_rate_hz(fastest_rate_per_s);
                 write!(
                     f,
                     "{field} = {rate_hz}: the step is too long; {} s times the model's fastest rate, {fastest_rate_per_s:.0} 1/s, \
-                     is {:.2}, and must be at most {MOST_STEP_TIMES_RATE}: at least {least_hz} Hz, a step of {:.2e} s",
+                     is {:.2}, and must be at most {MAX_STEP_TIMES_RATE}: at least {min_hz} Hz, a step of {:.2e} s",
                     1.0 / rate_hz,
                     fastest_rate_per_s / rate_hz,
-                    1.0 / least_hz
+                    1.0 / min_hz
                 )
             }
         }

@@ -42,9 +42,9 @@ prop_compose! {
 prop_compose! {
     fn trailer()(
         exit_code: u32, records: u32, overruns: u32, stack_bytes: u32, final_duty: u16, neutral_duty: u16,
-        least_spacing: u16, most_spacing: u16,
+        min_interval: u16, max_interval: u16,
     ) -> Trailer {
-        Trailer { exit_code, records, overruns, stack_bytes, final_duty, neutral_duty, least_spacing, most_spacing }
+        Trailer { exit_code, records, overruns, stack_bytes, final_duty, neutral_duty, min_interval, max_interval }
     }
 }
 

@@ -9,7 +9,7 @@ use anyhow::{Context, Result};
 use crate::setup::probe::TARGET;
 use crate::{process, rustup, workspace};
 
-/// The board that everything runs on unless it is told otherwise. Its images are where a plain `cargo build` puts them.
+/// The default board. Its images are where a plain `cargo build` puts them.
 pub const USUAL_BOARD: &str = "mps2";
 
 /// All boards: the folders in the firmware's `src/board`.
@@ -59,7 +59,7 @@ fn cargo_for_target(toolchain: &str, command: &str, target_dir: &Path) -> Result
         .args(workspace::locked())
         .arg("--target-dir")
         .arg(target_dir);
-    // These would replace what that configuration says: its target, and its linker arguments.
+    // These would override that configuration: its target, and its linker arguments.
     for variable in [
         "RUSTFLAGS",
         "CARGO_ENCODED_RUSTFLAGS",
@@ -83,7 +83,7 @@ pub fn framed(toolchain: &str, board: &str) -> Result<Command> {
     Ok(cargo)
 }
 
-/// What [`framed`] builds.
+/// The image that [`framed`] builds.
 pub fn framed_elf(board: &str) -> Result<PathBuf> {
     Ok(framed_target_dir(board)?
         .join(TARGET)

@@ -1,4 +1,4 @@
-//! The machine's package managers: what to run, or the line to type.
+//! The machine's package managers: the command to run, or the line to type.
 
 use std::io::{self, IsTerminal};
 use std::process::Command;
@@ -7,13 +7,13 @@ use anyhow::{Result, bail};
 
 use crate::process;
 
-/// The package managers with a line to type, in the order they are looked for.
+/// The supported package managers, in the order of the search.
 const MANAGERS: [Manager; 3] = [Manager::Apt, Manager::Dnf, Manager::Pacman];
 
 /// A package manager.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Manager {
-    /// Debian, Ubuntu; the only one that set-up uses by itself.
+    /// Debian, Ubuntu; the only one that set-up runs itself.
     Apt,
     /// Fedora.
     Dnf,
@@ -69,7 +69,7 @@ impl Manager {
     }
 }
 
-/// How xtask may install packages.
+/// How xtask can install packages.
 #[derive(Clone, Copy)]
 pub enum Apt {
     /// It is root.
@@ -79,7 +79,7 @@ pub enum Apt {
 }
 
 impl Apt {
-    /// `None` where there is no apt-get, or nobody who could type a password.
+    /// `None` where there is no apt-get, or no terminal for a password.
     pub fn here() -> Option<Self> {
         process::find("apt-get")?;
         if process::capture(Command::new("id").arg("-u")).as_deref() == Some("0") {
@@ -91,7 +91,7 @@ impl Apt {
     /// Fetches the lists of packages. A source that fails is no reason to stop: another may have what is needed.
     pub fn update(self) -> Result<()> {
         if !process::status(self.apt_get().args(["-q", "update"]))?.success() {
-            println!("   apt-get update did not fetch everything; going on with what is known");
+            println!("   apt-get update did not fetch everything; continuing with the known lists");
         }
         Ok(())
     }
@@ -135,7 +135,7 @@ impl Apt {
     }
 }
 
-/// The version that apt would install; `None` if it knows no such package.
+/// The version that apt would install; `None` if there is no such package.
 pub fn candidate(package: &str) -> Option<String> {
     let policy = process::capture(
         Command::new("apt-cache")

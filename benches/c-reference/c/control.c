@@ -126,7 +126,7 @@ static inline uint16_t crc_byte(uint16_t crc, uint8_t byte)
     return (uint16_t)(crc << 8) ^ crc_table[(crc >> 8) ^ byte];
 }
 
-/* Of the frame behind the checksum's own bytes, then of the data ID. */
+/* Of the frame after the checksum's own bytes, then of the data ID. */
 static inline uint16_t checksum(const uint8_t *frame, uint16_t data_id)
 {
     uint16_t crc = 0xFFFF;
@@ -401,12 +401,12 @@ static inline float lower(float a, float b)
     return b < a || !isfinite(a) ? b : a;
 }
 
-static inline struct reference_actuation tell(struct channel *channel, const struct reference_actuation *told,
+static inline struct reference_actuation report(struct channel *channel, const struct reference_actuation *own,
                                          const struct reference_actuation *other, uint8_t *frame)
 {
-    struct reference_actuation actuation = *told;
+    struct reference_actuation actuation = *own;
 
-    actuation.wheel_speed_limit_rpm = lower(told->wheel_speed_limit_rpm, other->wheel_speed_limit_rpm);
+    actuation.wheel_speed_limit_rpm = lower(own->wheel_speed_limit_rpm, other->wheel_speed_limit_rpm);
     frame[2] = channel->sent_counter++;
     frame[3] = (uint8_t)actuation.mode;
     memcpy(frame + 4, &actuation.faults, 4);
@@ -430,11 +430,11 @@ void reference_control_tick(void *memory, const void *given, void *result)
     _Alignas(4) uint8_t frame[FRAME_LEN], other_frame[FRAME_LEN];
     const bool differ = task->frames_differed || !channels_agree(a, b, sizeof *a);
     const uint32_t found_outside = input->found_by_pwm | fault_if(differ, FAULT_CHANNELS_DIFFER);
-    const struct reference_actuation told_a = channel_run(a, input, found_outside);
-    const struct reference_actuation told_b = channel_run(b, input, found_outside);
+    const struct reference_actuation actuation_a = channel_run(a, input, found_outside);
+    const struct reference_actuation actuation_b = channel_run(b, input, found_outside);
 
-    output->actuation = tell(a, &told_a, &told_b, frame);
-    tell(b, &told_b, &told_a, other_frame);
+    output->actuation = report(a, &actuation_a, &actuation_b, frame);
+    report(b, &actuation_b, &actuation_a, other_frame);
     task->frames_differed = !channels_agree(frame, other_frame, sizeof frame);
     output->setpoints[0] = a->supervisor.setpoint;
     output->setpoints[1] = b->supervisor.setpoint;

@@ -74,7 +74,7 @@ struct change {
     float fraction;
     bool has_threshold;
     float threshold;
-    enum friction_mode behind;
+    enum friction_mode mode_after;
 };
 
 static inline float cubic_force(const struct cubic_tire *tire, float alpha)
@@ -314,12 +314,12 @@ static inline struct vector runge_kutta_4(const struct model *model, const struc
 static inline bool release(const struct model *model, const struct vector *start, const struct vector *end,
                            struct injection injection, struct change *change)
 {
-    const enum friction_mode behind = mode_at_rest(model, end, injection);
+    const enum friction_mode mode_after = mode_at_rest(model, end, injection);
     float limit;
 
-    if (behind == FRICTION_POSITIVE)
+    if (mode_after == FRICTION_POSITIVE)
         limit = model->friction_limit_nm;
-    else if (behind == FRICTION_NEGATIVE)
+    else if (mode_after == FRICTION_NEGATIVE)
         limit = -model->friction_limit_nm;
     else
         return false;
@@ -327,7 +327,7 @@ static inline bool release(const struct model *model, const struct vector *start
     const float after = driving_torque_nm(model, end, injection);
     change->fraction = (limit - before) / (after - before);
     change->has_threshold = false;
-    change->behind = behind;
+    change->mode_after = mode_after;
     return true;
 }
 
@@ -344,16 +344,16 @@ static inline bool crossing(const struct model *model, const struct vector *star
         return false;
     if (mode == FRICTION_POSITIVE && after < sign.upper) {
         change->threshold = sign.upper;
-        change->behind = apart ? FRICTION_NEUTRAL : FRICTION_NEGATIVE;
+        change->mode_after = apart ? FRICTION_NEUTRAL : FRICTION_NEGATIVE;
     } else if (mode == FRICTION_NEGATIVE && after > sign.lower) {
         change->threshold = sign.lower;
-        change->behind = apart ? FRICTION_NEUTRAL : FRICTION_POSITIVE;
+        change->mode_after = apart ? FRICTION_NEUTRAL : FRICTION_POSITIVE;
     } else if (mode == FRICTION_NEUTRAL && apart && after > sign.upper) {
         change->threshold = sign.upper;
-        change->behind = FRICTION_POSITIVE;
+        change->mode_after = FRICTION_POSITIVE;
     } else if (mode == FRICTION_NEUTRAL && apart && after < sign.lower) {
         change->threshold = sign.lower;
-        change->behind = FRICTION_NEGATIVE;
+        change->mode_after = FRICTION_NEGATIVE;
     } else {
         return false;
     }
@@ -381,14 +381,14 @@ static void step(const struct model *model, struct vector *state, enum friction_
     }
 
     struct vector at = runge_kutta_4(model, state, step_s * change.fraction, injection, mode);
-    enum friction_mode behind = change.behind;
+    enum friction_mode mode_after = change.mode_after;
     if (change.has_threshold) {
         at.x[friction_argument(model)] = change.threshold;
         if (can_stick(model, injection))
-            behind = mode_at_rest(model, &at, injection);
+            mode_after = mode_at_rest(model, &at, injection);
     }
-    *state = runge_kutta_4(model, &at, step_s * (1.0f - change.fraction), injection, behind);
-    *friction = behind;
+    *state = runge_kutta_4(model, &at, step_s * (1.0f - change.fraction), injection, mode_after);
+    *friction = mode_after;
 }
 
 /* Set-up. */

@@ -8,7 +8,7 @@
 
 #define PI 3.14159265358979323846
 #define PWM_RATE_HZ 10000.0f
-#define PERIODS_A_TICK 10
+#define PERIODS_PER_TICK 10
 #define SINE_ERROR 1.2e-3f
 /* Periods in a row in which the pin may show another duty. */
 #define READBACK_TOLERANCE 1
@@ -27,7 +27,7 @@ struct limiter {
     uint32_t faults;
     float sample_error;
     uint16_t expected_code;
-    /* There is dither; the rest of a half period is told only then. */
+    /* There is dither; the rest of a half period is valid only then. */
     bool has_half_period;
     bool is_positive;
     bool is_whole;
@@ -44,7 +44,7 @@ struct channel {
     struct limiter limiter;
     struct servo servo;
     struct reference_setpoint setpoint;
-    uint32_t periods_a_tick;
+    uint32_t periods_per_tick;
     uint32_t periods_to_tick;
 };
 
@@ -101,7 +101,7 @@ static inline float oscillator_sample(struct oscillator *oscillator)
 
 static inline void watch_half_period(struct limiter *limiter, float dither_v, float amplitude_v)
 {
-    /* Nearer to zero a sample's sign may be its error's. */
+    /* Closer to zero the sign of a sample may be that of its error. */
     const float sure_v = amplitude_v * limiter->sample_error;
 
     if (!limiter->has_half_period) {
@@ -172,7 +172,7 @@ static inline struct period channel_begin(struct channel *channel)
         channel->periods_to_tick--;
     if (channel->periods_to_tick == 0) {
         period.control_due = true;
-        channel->periods_to_tick = channel->periods_a_tick;
+        channel->periods_to_tick = channel->periods_per_tick;
     }
     return period;
 }
@@ -258,7 +258,7 @@ void reference_pwm_init(void *memory, const struct reference_choice *choice)
         channel->servo.period = timer_period;
         channel->servo.midpoint = 0.5f * (float)timer_period;
         channel->servo.counts_per_volt = channel->servo.midpoint / 12.0f;
-        channel->periods_a_tick = PERIODS_A_TICK;
-        channel->periods_to_tick = PERIODS_A_TICK;
+        channel->periods_per_tick = PERIODS_PER_TICK;
+        channel->periods_to_tick = PERIODS_PER_TICK;
     }
 }

@@ -12,10 +12,10 @@ use shared_model::tire::TireModel;
 use shared_model::vehicle::{SlipForm, State};
 
 /// A call that is counted: task, input, output.
-// SAFETY: a type; whoever calls says why it may.
+// SAFETY: a type; each call has its own reason.
 pub type Call = unsafe extern "C" fn(*mut c_void, *const c_void, *mut c_void);
 
-/// What a scenario may choose.
+/// The choices of a scenario.
 #[repr(C)]
 pub struct Choice {
     waveform: u32,
@@ -190,17 +190,17 @@ pub struct ControlOutputBits {
 
 impl From<&ControlOutput<f32>> for ControlOutputBits {
     fn from(output: &ControlOutput<f32>) -> Self {
-        let told = &output.actuation;
+        let actuation = &output.actuation;
         Self {
             setpoints: setpoints(output),
             frame: output.frame,
-            mode: told.mode as u32,
-            faults: told.faults,
-            motor_voltage_v: told.motor_voltage_v.to_bits(),
-            dither_amplitude_v: told.dither_amplitude_v.to_bits(),
-            wheel_speed_limit_rpm: told.wheel_speed_limit_rpm.to_bits(),
-            warnings: told.warnings,
-            sensor_counter: told.sensor_counter,
+            mode: actuation.mode as u32,
+            faults: actuation.faults,
+            motor_voltage_v: actuation.motor_voltage_v.to_bits(),
+            dither_amplitude_v: actuation.dither_amplitude_v.to_bits(),
+            wheel_speed_limit_rpm: actuation.wheel_speed_limit_rpm.to_bits(),
+            warnings: actuation.warnings,
+            sensor_counter: actuation.sensor_counter,
         }
     }
 }

@@ -29,9 +29,9 @@ use shared_model::{Scenario, integrate};
 
 /// Steps of the model, a millisecond each.
 const STEPS: u32 = 4000;
-/// Of so many the last begins in a state that no motion led to.
-const STEPS_A_MOTION: u32 = 40;
-/// Room for a task in C, which says how much it needs.
+/// The last step of this number begins in a random state.
+const STEPS_PER_TRAJECTORY: u32 = 40;
+/// Memory for a task in C, which reports its size.
 const MODEL_BYTES: usize = 512;
 const PWM_BYTES: usize = 256;
 const CONTROL_BYTES: usize = 1536;
@@ -193,7 +193,7 @@ fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
         if index == STEPS / 4 {
             injection = scenario.dither.injection(0.0);
         }
-        if index % STEPS_A_MOTION == STEPS_A_MOTION - 1 {
+        if index % STEPS_PER_TRAJECTORY == STEPS_PER_TRAJECTORY - 1 {
             pair.rust.state = model.state(random.vector().into());
         }
         let before = pair.rust.state.friction;
@@ -222,7 +222,7 @@ fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
     Some(unequal == 0)
 }
 
-/// Numbers that look random.
+/// Pseudo-random numbers.
 struct Random(u32);
 
 impl Random {
@@ -341,7 +341,7 @@ fn run_ecu(scenario: &Scenario<f32>, ecu: Ecu<f32>, choice: &Choice) -> Option<b
     Some(unequal == 0)
 }
 
-/// What stands in the output's place before the first tick.
+/// Place holder of the output before the first tick.
 const NO_OUTPUT: ControlOutput<f32> = ControlOutput {
     setpoints: [Setpoint {
         motor_v: 0.0,

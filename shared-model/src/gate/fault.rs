@@ -1,4 +1,4 @@
-//! What the gate can find, as bits of a frame.
+//! Faults that the gate detects, as bits of a frame.
 
 use crate::listed;
 use core::ops::BitOrAssign;
@@ -20,11 +20,11 @@ listed! {
         SteeringInconsistent = 4 => "steering inconsistent",
         /// Wheel speed times yaw rate is more lateral acceleration than the road can give.
         LateralAcceleration = 5 => "lateral acceleration",
-        /// No valid sensor frame for too long.
+        /// The last valid sensor frame is too old.
         FrameAge = 6 => "frame age",
-        /// Too little or too much time between two control ticks, by an independent clock.
+        /// The time between two control ticks, by an independent clock, is outside its window.
         TickWindow = 7 => "tick window",
-        /// A control tick was not done when the next was due.
+        /// A control tick was not finished when the next was due.
         ControlLate = 8 => "control late",
         /// The controller's command is not a finite number.
         CommandNotANumber = 9 => "command not a number",
@@ -36,9 +36,9 @@ listed! {
         DitherAmplitude = 12 => "dither amplitude",
         /// The dither is slower or faster than allowed.
         DitherFrequency = 13 => "dither frequency",
-        /// The duty on the servo's pin is not the one that was put out.
+        /// The duty on the servo's pin differs from the commanded one.
         Readback = 14 => "readback",
-        /// The program's two channels differ: memory was changed.
+        /// The program's two channels differ, which indicates memory corruption.
         ChannelsDiffer = 15 => "channels differ",
     }
 }

@@ -5,7 +5,7 @@ use crate::parameter::parameters;
 
 parameters! {
     section "gate";
-    /// What the gate lets through. The defaults hold every motion of the preset from 1200 to 1950 rpm, chaos included, with a
+    /// Limits of the gate. The defaults include every motion of the preset from 1200 to 1950 rpm, chaos included, with a
     /// margin of 1.8 or more; `docs/design.md` has the measured extremes beside them.
     pub struct Limits {
         /// Greatest magnitude of the motor's share of the servo voltage, V.
@@ -20,7 +20,7 @@ parameters! {
         dither_frequency_min_rad_per_s: 1.0..=1e6,
         /// Fastest dither, rad/s.
         dither_frequency_max_rad_per_s: 1.0..=1e6,
-        /// Time in which the safe state takes the dither away, s.
+        /// Time in which the safe state ramps the dither out, s.
         ramp_out_s: 1e-3..=10.0,
         /// Wheel speed that the safe state demands, rpm.
         safe_wheel_speed_rpm: 0.0..=1e5,

@@ -35,7 +35,7 @@ impl<T: Real> State<T> {
     }
 }
 
-/// The right-hand side of (14) with its constants worked out for one scenario and wheel speed.
+/// The right-hand side of (14) with its constants computed for one scenario and wheel speed.
 #[derive(Debug, Clone, Copy)]
 pub struct Model<T> {
     slip_form: SlipForm,
@@ -58,7 +58,7 @@ pub struct Model<T> {
     dither_frequency_rad_per_s: T,
 }
 
-/// The numbers in [`Model::derivative`], for whoever evaluates it in another form.
+/// The constants of [`Model::derivative`], for its evaluation in another form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Constants<T> {
     /// Form of the slip angles.
@@ -84,7 +84,7 @@ pub struct Constants<T> {
 }
 
 impl<T: Real> Model<T> {
-    /// The numbers in the derivative beside those of tyres and friction.
+    /// The constants of the derivative except those of tyres and friction.
     pub fn constants(&self) -> Constants<T> {
         Constants {
             slip_form: self.slip_form,
@@ -111,7 +111,8 @@ impl<T: Real> Model<T> {
         let mut friction = scenario.friction;
         let friction_limit_nm = friction.limit_nm(steering.pneumatic_trail_m);
         if friction_limit_nm == T::zero() {
-            // Friction without torque is none. Its modes would change without an effect, and without end where the steering comes to rest.
+            // A friction law without torque would only change modes without effect, endlessly where the steering comes to
+            // rest.
             friction.law = FrictionLaw::None;
         }
         let mut model = Self {
@@ -136,8 +137,8 @@ impl<T: Real> Model<T> {
         model
     }
 
-    /// Goes on at another wheel speed N, rpm, for a speed that changes slowly: (14) holds it constant and has no term in its
-    /// rate.
+    /// Continues at another wheel speed N, rpm, for a speed that changes slowly: (14) holds it constant and has no term
+    /// in its rate.
     pub fn set_wheel_speed_rpm(&mut self, vehicle: &Vehicle<T>, wheel_speed_rpm: T) {
         let speed = vehicle.speed_m_per_s(wheel_speed_rpm);
         self.front_lever_s = vehicle.front_axle_distance_m / speed;
@@ -145,7 +146,7 @@ impl<T: Real> Model<T> {
         self.lateral_gain = T::one() / (vehicle.mass_kg * speed);
     }
 
-    /// Goes on with another torque of the motor about the steering axis, r_s tau_M, N m.
+    /// Continues with another torque of the motor about the steering axis, r_s tau_M, N m.
     pub fn set_motor_torque_nm(&mut self, motor_torque_nm: T) {
         self.motor_torque_nm = motor_torque_nm;
     }

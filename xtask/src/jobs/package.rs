@@ -1,4 +1,4 @@
-//! `cargo xtask package`: what a registry would get of each publishable package, built from that alone.
+//! `cargo xtask package`: packs each publishable package and builds it from its package alone.
 
 use anyhow::{Context, Result};
 

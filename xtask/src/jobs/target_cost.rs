@@ -22,7 +22,7 @@ const TEST: [&str; 8] = [
     "--",
     "--nocapture",
 ];
-/// Has the test write what it compares with.
+/// Makes the test write the expected figures.
 const OVERWRITE: &str = "DITHERSTEER_OVERWRITE_EXPECTED";
 
 /// Builds both, and compares their bits and instructions, or records the latter.

@@ -1,7 +1,7 @@
 //! The target built from Debian's Rust packages, for machines where rustup cannot download.
 //!
 //! Debian's compiler comes with the source of its libraries. Their part that the firmware needs is built once, into
-//! a folder that rustup then knows as one more toolchain. Nothing in rustup's own toolchains changes.
+//! a folder that rustup links as one more toolchain. rustup's own toolchains do not change.
 
 use std::env;
 use std::fs::{self, Permissions};
@@ -21,7 +21,7 @@ const PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 const RUSTC: &str = "/usr/bin/rustc";
 const CARGO: &str = "/usr/bin/cargo";
 
-/// What set-up would do.
+/// The steps of set-up.
 pub fn plan() -> String {
     format!(
         "Debian's {} and a toolchain {TOOLCHAIN} made of them",
@@ -29,16 +29,16 @@ pub fn plan() -> String {
     )
 }
 
-/// Installs the packages, builds the libraries and makes the toolchain known, as far as that is not done yet.
+/// Installs the packages, builds the libraries and links the toolchain, each unless it is done already.
 pub fn install(pinned: &str) -> Result<()> {
     install_packages(pinned)?;
     let folder = folder()?;
-    // The libraries may be there, and only rustup not know them; or they may belong to an older compiler.
+    // The libraries may exist without being linked, or may belong to an older compiler.
     if !builds(Command::new(folder.join("bin/rustc")))? {
         build(pinned, &folder)?;
     }
     println!(
-        "setup: making {} known to rustup as {TOOLCHAIN}",
+        "setup: linking {} into rustup as {TOOLCHAIN}",
         folder.display()
     );
     process::run(
@@ -84,7 +84,7 @@ fn install_packages(pinned: &str) -> Result<()> {
     let line = PACKAGES.join(" ");
     let Some(apt) = Apt::here() else {
         bail!(
-            "Debian's packages would do too: `sudo apt-get update && sudo apt-get install --no-install-recommends {line}`"
+            "Debian's packages are an alternative: `sudo apt-get update && sudo apt-get install --no-install-recommends {line}`"
         );
     };
     println!(
@@ -127,7 +127,7 @@ fn build(pinned: &str, folder: &Path) -> Result<()> {
     );
     let work = folder.with_extension("new");
     if work.exists() {
-        // Left behind by a set-up that was interrupted.
+        // From an interrupted set-up.
         fs::remove_dir_all(&work).with_context(|| format!("cannot remove {}", work.display()))?;
     }
     let libraries = build_libraries(&work)?;
@@ -169,7 +169,7 @@ fn build_libraries(work: &Path) -> Result<PathBuf> {
         "-Zbuild-std=core,alloc",
     ]);
     cargo.arg("-Zbuild-std-features=compiler-builtins-mem");
-    // An own cargo home, so that the user's configuration has no say; bitcode, so that the firmware can use LTO.
+    // An own cargo home, so that the user's configuration does not apply; bitcode, so that the firmware can use LTO.
     cargo
         .env("CARGO_HOME", work.join("cargo-home"))
         .env("CARGO_TARGET_DIR", work.join("target"));
@@ -226,7 +226,7 @@ fn assemble(pinned: &str, libraries: &Path, new: &Path, place: &Path) -> Result<
     Ok(())
 }
 
-/// Moves a complete toolchain to its place; an older one makes way.
+/// Moves a complete toolchain to its place; an older one is removed.
 fn replace(new: &Path, place: &Path) -> Result<()> {
     if place.exists() {
         fs::remove_dir_all(place).with_context(|| format!("cannot remove {}", place.display()))?;

@@ -37,7 +37,7 @@ pub fn builds(mut rustc: Command) -> Result<bool> {
     else {
         return Ok(false);
     };
-    // A rustup that knows no such toolchain reads nothing; its exit status is the answer.
+    // A rustup without that toolchain reads nothing; its exit status is the answer.
     let _ = child
         .stdin
         .take()

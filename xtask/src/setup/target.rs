@@ -46,10 +46,10 @@ pub fn ensure() -> Result<String> {
     Ok(toolchain)
 }
 
-/// What set-up would do about a missing target.
+/// The steps of set-up for a missing target.
 pub fn plan(pinned: &str) -> Result<String> {
     let debian = debian::plan();
-    Ok(match is_borrowed(pinned)? {
+    Ok(match is_linked(pinned)? {
         true => format!(
             "install {debian} ({pinned} only links to another toolchain, which stays as it is)"
         ),
@@ -73,12 +73,12 @@ fn add_line(pinned: &str) -> String {
 }
 
 /// A toolchain whose folder is a link belongs to another name, or another owner: nothing is written into it.
-fn is_borrowed(pinned: &str) -> Result<bool> {
+fn is_linked(pinned: &str) -> Result<bool> {
     Ok(rustup::folder(pinned)?.is_symlink())
 }
 
 fn add_through_rustup(pinned: &str) -> Result<bool> {
-    if is_borrowed(pinned)? {
+    if is_linked(pinned)? {
         println!("setup: rustup's {pinned} only links to another toolchain, which stays as it is");
         return Ok(false);
     }
@@ -87,7 +87,7 @@ fn add_through_rustup(pinned: &str) -> Result<bool> {
         rustup::folder(pinned)?.display()
     );
     let mut command = rustup::rustup()?;
-    // A blocked download is expected on some machines; rustup's own stack trace says nothing about it.
+    // A blocked download is expected on some machines; rustup's own stack trace would not explain it.
     command
         .args(["target", "add", "--toolchain", pinned, TARGET])
         .env_remove("RUST_BACKTRACE");
@@ -102,7 +102,7 @@ fn add_through_rustup(pinned: &str) -> Result<bool> {
     Ok(false)
 }
 
-/// Whether a toolchain that rustup knows builds for the target.
+/// Whether a toolchain of rustup builds for the target.
 fn has_target(toolchain: &str) -> Result<bool> {
     builds(rustup::tool(toolchain, "rustc")?)
 }
