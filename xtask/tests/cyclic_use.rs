@@ -32,6 +32,12 @@ enum Target {
     Module(ModulePath),
 }
 
+/// Files that use each other, and the uses: user, line, used.
+struct Circle<'a> {
+    files: BTreeSet<&'a Path>,
+    uses: Vec<(&'a Path, usize, &'a Path)>,
+}
+
 /// A crate's modules and the paths in them.
 #[derive(Default)]
 struct Crate {
@@ -66,7 +72,7 @@ impl Crate {
                 at = end_of_item(lexemes, at + 7);
             } else if word == "mod" && (is(at + 2, ";") || is(at + 2, "{")) {
                 let name = lexemes[at + 1].0.clone();
-                let child = [module.clone(), vec![name.clone()]].concat();
+                let child = child(&module, &name);
                 let inside = folder.join(&name);
                 if is(at + 2, ";") {
                     let flat = folder.join(&name).with_extension("rs");
@@ -131,7 +137,6 @@ impl Crate {
     /// Where a path in the module `from` leads; `None` outside the crate.
     fn resolve(&self, from: &[String], segments: &[String], depth: u32) -> Option<Target> {
         let (first, mut rest) = segments.split_first()?;
-        let child = |module: &[String], name: &String| [module, &[name.clone()]].concat();
         let mut module = match first.as_str() {
             "crate" => vec![],
             "self" => from.to_vec(),
@@ -161,7 +166,7 @@ impl Crate {
             return None;
         }
         // A name that an import of the same name begins with is a crate's or a child's, not the import.
-        let is_child = self.files.contains_key(&[module, &[name.clone()]].concat());
+        let is_child = self.files.contains_key(&child(module, name));
         if is_itself && !is_child {
             return None;
         }
@@ -193,41 +198,49 @@ impl Crate {
         uses
     }
 
-    /// Sets of files that use each other, each with its uses.
-    fn circles(&self) -> Vec<(BTreeSet<&Path>, Vec<(&Path, usize, &Path)>)> {
+    fn circles(&self) -> Vec<Circle<'_>> {
         let uses = self.uses();
-        let reached = |start| {
+        let reached_from = |start| {
             let mut reached = BTreeSet::new();
             let mut open = vec![start];
             while let Some(file) = open.pop() {
                 let used = uses.get(file).into_iter().flat_map(BTreeMap::keys);
-                open.extend(used.filter(|used| reached.insert(**used)));
+                open.extend(used.copied().filter(|used| reached.insert(*used)));
             }
             reached
         };
-        let reached: BTreeMap<&Path, BTreeSet<&Path>> =
-            uses.keys().map(|&file| (file, reached(file))).collect();
+        let reached: BTreeMap<&Path, BTreeSet<&Path>> = uses
+            .keys()
+            .map(|&file| (file, reached_from(file)))
+            .collect();
         let mutual = |file: &Path| {
             let others = reached[file].iter().copied();
             let back = |other: &&Path| reached.get(other).is_some_and(|them| them.contains(file));
             others.filter(back).collect::<BTreeSet<&Path>>()
         };
         let circles: BTreeSet<_> = reached.keys().map(|file| mutual(file)).collect();
-        let within = |circle: &BTreeSet<&Path>| {
-            let inside = uses.iter().filter(|(user, _)| circle.contains(*user));
-            let pairs =
-                inside.flat_map(|(&user, used)| used.iter().map(move |(&u, &l)| (user, l, u)));
-            let pairs: Vec<_> = pairs.collect();
-            pairs
-                .into_iter()
-                .filter(|(_, _, used)| circle.contains(used))
-                .collect()
-        };
-        let circles = circles.into_iter().filter(|circle| !circle.is_empty());
+        let circles = circles.into_iter().filter(|files| !files.is_empty());
         circles
-            .map(|circle| (circle.clone(), within(&circle)))
+            .map(|files| {
+                let pairs = uses.iter().flat_map(|(&user, used)| {
+                    used.iter().map(move |(&used, &line)| (user, line, used))
+                });
+                let inside =
+                    pairs.filter(|(user, _, used)| files.contains(user) && files.contains(used));
+                Circle {
+                    uses: inside.collect(),
+                    files,
+                }
+            })
             .collect()
     }
+}
+
+/// The module `name` in `module`.
+fn child(module: &[String], name: &str) -> ModulePath {
+    let mut path = module.to_vec();
+    path.push(name.to_owned());
+    path
 }
 
 fn is_word(text: &str) -> bool {
@@ -350,9 +363,9 @@ fn no_files_use_each_other() {
         file.display().to_string()
     };
     for root in &files {
-        for (circle, uses) in Crate::read(root).circles() {
+        for Circle { files, uses } in Crate::read(root).circles() {
             found.insert(
-                circle
+                files
                     .into_iter()
                     .map(relative)
                     .collect::<Vec<_>>()
@@ -394,7 +407,7 @@ fn circles_of(name: &str, files: &[(&str, &str)]) -> Vec<Vec<String>> {
     let short = |path: &Path| path.strip_prefix(&folder).unwrap().display().to_string();
     let circles = found.circles().into_iter();
     circles
-        .map(|(circle, _)| circle.into_iter().map(short).collect())
+        .map(|circle| circle.files.into_iter().map(short).collect())
         .collect()
 }
 
