@@ -99,7 +99,7 @@ fn every_duty_is_in_the_timers_register() {
     }
 }
 
-/// What is put into the RAM through the core is seen past it, and the other way round nothing is where nothing is mapped.
+/// Data written to the RAM through the core is visible past it, and conversely; there is nothing where nothing is mapped.
 #[test]
 fn memory_is_read_and_written() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");

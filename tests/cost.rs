@@ -37,7 +37,7 @@ fn c_compiler() -> Option<String> {
     text.lines().next().map(str::to_owned)
 }
 
-/// What the image counted, by function and language; its exit code is 0 only if all bits were equal.
+/// The image's counts, by function and language; its exit code is 0 only if all bits were equal.
 fn count(settings: &str) -> BTreeMap<(String, String), Counted> {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let words = settings.split_whitespace().map(str::to_owned);

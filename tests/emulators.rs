@@ -173,7 +173,7 @@ fn peak_kb(child: &Child) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// A signal reaches this program alone; the emulator ends with it all the same.
+/// A signal reaches this program alone; the emulator ends with it nevertheless.
 #[test]
 fn the_emulator_ends_with_this_program() {
     for (test, arguments) in [
@@ -220,7 +220,7 @@ fn the_emulator_ends_with_this_program() {
     }
 }
 
-/// The sections' table is what a strip takes away; the emulator needs none.
+/// `strip` removes the sections' table; the emulator needs none.
 #[test]
 fn an_image_without_symbols_runs_without_log() {
     let real = tempfile::tempdir().expect("a temporary folder can be made");

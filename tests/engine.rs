@@ -36,7 +36,7 @@ fn span(yaw_rate_turns: bool) -> Span {
     }
 }
 
-// What is counted: each runs alone in a process of its own.
+// The counted work: each runs alone in a process of its own.
 
 #[test]
 #[ignore = "counted by the test below"]

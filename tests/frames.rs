@@ -183,7 +183,7 @@ fn actuator_signals(a: &Actuation<f32>) -> Signals {
     ]
 }
 
-/// The frames of one sender of each kind, with what is in them.
+/// The frames of one sender of each kind, with their content.
 fn frames() -> Vec<(Kind, FrameBytes, Signals)> {
     let mut rng = Rng::with_seed(4);
     let mut sender = Sender::new(SENSOR_DATA_ID);

@@ -18,7 +18,7 @@ use tests::golden::{Figure, check_figures};
 use tests::{TIME_OUT, board_image, framed_image, image, record, root, scenario};
 
 const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
-/// What the ECU's program may take of any board, bytes: limits of this project, far below what the boards have.
+/// Memory that the ECU's program may use on any board, bytes: limits of this project, far below what the boards have.
 const STACK_LIMIT_BYTES: u32 = 16 * 1024;
 const FLASH_LIMIT_BYTES: u32 = 128 * 1024;
 const RAM_LIMIT_BYTES: u32 = 64 * 1024;
@@ -57,7 +57,7 @@ fn worst_stack() {
     for board in BOARDS {
         let framed = framed_image(board);
         let stack = proven_stack(board, &framed);
-        // Two independent sources: what the compiler states, and what the instructions take.
+        // Two independent sources: the compiler's figures, and the instructions.
         assert!(
             10 * stack.confirmed_functions >= 9 * stack.stated_functions,
             "{board}: {} of {} frames confirmed",

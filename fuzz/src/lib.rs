@@ -1,9 +1,10 @@
-//! Hostile bytes for every reader of what comes from outside.
+//! Hostile bytes for every reader of external data.
 //!
-//! A [`Target`] is a reader with what has to be known to reach the code behind its check sums. The test `replay` runs the
-//! corpus and a fixed number of mutations of each through [`Target::check`], the same ones every time; the driver `guided`
-//! leads libFuzzer there, which looks for inputs that reach new code (`cargo xtask fuzz`). Both hold a reader to the same:
-//! no panic, and no more memory than a multiple of its input. That it ends is what a run that does not hang shows.
+//! A [`Target`] is a reader with the repair of checksums and frames that lets inputs reach its inner code. The test
+//! `replay` runs the corpus and a fixed number of mutations of each through [`Target::check`], the same ones every time;
+//! the driver `guided` leads libFuzzer there, which looks for inputs that reach new code (`cargo xtask fuzz`). Both
+//! require the same of a reader: no panic, and memory within a multiple of its input. A run that ends shows that every
+//! reader does.
 
 mod images;
 mod links;

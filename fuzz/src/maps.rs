@@ -1,4 +1,4 @@
-//! What a map is kept in: tiles, and the Parquet file that a schedule begins with.
+//! Files of a map: tiles, and the Parquet file that a schedule begins with.
 
 use crate::target::{Target, as_it_is};
 use shared_model::Scenario;

@@ -1,4 +1,4 @@
-//! What the firmware tells: telemetry, and all that passes in the loop.
+//! Data from the firmware: telemetry, and the exchange in the loop.
 
 use crate::target::Target;
 use shared_model::Scenario;

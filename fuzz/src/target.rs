@@ -4,9 +4,9 @@
 pub struct Target {
     /// Its name, and that of its folder in the corpus.
     pub name: &'static str,
-    /// Reads the bytes, and does with what is read what a command does at least.
+    /// Reads the bytes, and processes the result as far as every command does.
     pub read: fn(&[u8]),
-    /// Makes check sums and frames right again; what is not to be repaired stays.
+    /// Repairs checksums and frames; other damage stays.
     pub repair: fn(&mut Vec<u8>),
     /// Inputs that are right.
     pub seeds: fn() -> Vec<Vec<u8>>,

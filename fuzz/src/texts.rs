@@ -1,4 +1,4 @@
-//! Texts: configurations, manoeuvres, settings, and what a reproduction keeps of its work.
+//! Texts: configurations, manoeuvres, settings, and the records of a reproduction.
 
 use crate::target::{Target, as_it_is};
 use shared_model::Scenario;

@@ -12,7 +12,7 @@ use std::str::FromStr;
 
 const PRESETS: [Preset; 2] = [Preset::Reconstruction, Preset::Printed];
 
-/// Calls the check with every section's name and place; adds up what it counts.
+/// Calls the check with every section's name and place; adds up its counts.
 macro_rules! each_section {
     ($check:ident::<$t:ty>) => {
         $check::<$t, _>("vehicle", |s| &mut s.vehicle)
@@ -28,8 +28,8 @@ macro_rules! each_section {
     };
 }
 
-/// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and run. The sections' lists and the
-/// map of a scenario are both held to it.
+/// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and run. The sections'
+/// lists and the map of a scenario are both held to it.
 const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 5 + 24 + 8;
 
 /// The floats next to a bound.
@@ -56,8 +56,8 @@ impl Neighbours for f64 {
     }
 }
 
-/// Every number of a section: what is not finite or not in its range is refused with a message that names it; the bounds
-/// themselves are allowed. Returns how many there are.
+/// Every number of a section: a value that is not finite or not in its range is refused with a message that names it; the
+/// bounds themselves are allowed. Returns how many there are.
 fn ranges<T: Neighbours, P: ParameterSet<T>>(
     section: &'static str,
     of: fn(&mut Scenario<T>) -> &mut P,

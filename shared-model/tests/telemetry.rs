@@ -77,7 +77,7 @@ fn encode_trailer(trailer: &Trailer) -> Vec<u8> {
     buffer.to_vec()
 }
 
-/// Every single-bit flip is refused; every cut is reported with the bytes that are missing; a longer stream behind the
+/// Every single-bit flip is refused; every cut is reported with the bytes that are missing; a longer stream after the
 /// frame does not matter.
 fn check_damage<F>(
     frame: &[u8],

@@ -18,7 +18,7 @@ pub struct Figure {
     pub name: String,
     /// The figure.
     pub value: f64,
-    /// What it may be at most, whatever the compiler.
+    /// Greatest value, whatever the compiler.
     pub limit: Option<f64>,
     /// Unit.
     pub unit: &'static str,

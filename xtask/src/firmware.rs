@@ -73,7 +73,7 @@ fn cargo_for_target(toolchain: &str, command: &str, target_dir: &Path) -> Result
 
 /// A build of the ECU's program with a section `.stack_sizes`, the frame of each function, in a folder of its own.
 ///
-/// The option is not stable yet. For one crate alone it may be used all the same, and as that crate's compilation makes the
+/// The option is not stable yet. For one crate alone it may still be used, and as that crate's compilation makes the
 /// code of all others, too, the frames are those of the whole program. The code is that of [`build`].
 pub fn framed(toolchain: &str, board: &str) -> Result<Command> {
     let mut cargo = cargo_into(toolchain, "rustc", board, &framed_target_dir(board)?)?;

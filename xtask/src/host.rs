@@ -72,9 +72,9 @@ impl Manager {
 /// How xtask can install packages.
 #[derive(Clone, Copy)]
 pub enum Apt {
-    /// It is root.
+    /// As root.
     Root,
-    /// sudo can ask for a password on the terminal.
+    /// With sudo, which prompts for a password on the terminal.
     Sudo,
 }
 
@@ -88,7 +88,7 @@ impl Apt {
         (io::stdin().is_terminal() && process::find("sudo").is_some()).then_some(Self::Sudo)
     }
 
-    /// Fetches the lists of packages. A source that fails is no reason to stop: another may have what is needed.
+    /// Fetches the lists of packages. A source that fails is no reason to stop: another may have the package.
     pub fn update(self) -> Result<()> {
         if !process::status(self.apt_get().args(["-q", "update"]))?.success() {
             println!("   apt-get update did not fetch everything; continuing with the known lists");
@@ -105,7 +105,7 @@ impl Apt {
         self.install(&[package])
     }
 
-    /// Installs packages without what they merely recommend.
+    /// Installs packages without the recommended ones.
     pub fn install(self, packages: &[&str]) -> Result<()> {
         let mut command = self.apt_get();
         command

@@ -12,7 +12,7 @@ const OWN: [&str; 4] = ["c-reference", "firmware", "tests", "xtask"];
 /// Packs all others and builds each from its package: a minute on two cores.
 pub fn run() -> Result<()> {
     build()?;
-    println!("passed: every publishable package builds from what is packed of it");
+    println!("passed: every publishable package builds from its packed files");
     Ok(())
 }
 
