@@ -4,7 +4,7 @@
 //! sensor frame, runs the controller, and passes both to the gate. Its result acts from the next control tick on, however
 //! long it took, so that the timing of interrupts cannot change a result.
 //!
-//! Both tasks run twice, on two sets of parameters and state in memory ([`dual_channel`]). A mismatch indicates memory
+//! Both tasks run twice, on two sets of parameters and state in memory (`dual_channel`). A mismatch indicates memory
 //! corruption and latches the safe state; until that acts, the duty closer to neutral is put out. The actuator frame is
 //! the first channel's, with the lower of both wheel speed limits. [`Ecu`] runs the tasks in turn on the host; firmware
 //! runs them at two priorities. Both give the same bits.
