@@ -54,7 +54,7 @@ fn magic_formula_and_exact_slip() {
         let mut scenario = scenario(waveform, Application::Averaged);
         scenario.tires.model = TireModel::MagicFormula;
         scenario.vehicle.slip_form = SlipForm::Exact;
-        // The mean of the Magic Formula over a sine takes half a million instructions a step.
+        // The mean of the Magic Formula over a sine takes half a million instructions per step.
         scenario.run.control_rate_hz = 20.0;
         assert_same_bits(&scenario, Machine::Mps2An386);
     }

@@ -1,4 +1,4 @@
-//! The same ECU on other boards: an STM32F405 whose timer is looked at from outside, and the images of all boards.
+//! The same ECU on other boards: an STM32F405 whose timer is inspected from outside, and the images of all boards.
 
 use dynamics::simulate::simulate;
 use pil::equivalence::bits;
@@ -77,7 +77,7 @@ fn every_duty_is_in_the_timers_register() {
         assert_eq!(read(qmp, PSC), 0);
         assert_eq!(read(qmp, CCR1), 800, "neutral before the first interrupt");
 
-        // Behind the last of the thousand there is no interrupt to stop at.
+        // After the last of the thousand there is no interrupt to stop at.
         let found: Vec<(u32, u32)> = (0..999)
             .map(|_| {
                 let stop = run.gdb.run_to_stop(TIME_OUT).expect("the core stops");
@@ -100,7 +100,7 @@ fn every_duty_is_in_the_timers_register() {
     }
 }
 
-/// What is put into the RAM through the core is seen past it, and the other way round nothing is where nothing is mapped.
+/// Data written to the RAM through the core is visible past it, and conversely; there is nothing where nothing is mapped.
 #[test]
 fn memory_is_read_and_written() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
@@ -168,7 +168,7 @@ fn a_scenario_for_another_timer_is_refused() {
         let finished = run(&image, machine, &[setting], folder.path(), TIME_OUT)
             .unwrap_or_else(|error| panic!("{error}"));
         assert_eq!(finished.exit_code, BAD_SCENARIO, "{:?}", finished.log);
-        let line = finished.log.last().expect("it says why");
+        let line = finished.log.last().expect("it has a reason");
         assert!(
             line.contains(&format!("servo.timer_clock_hz = {timer_clock_hz}")),
             "{line}"
@@ -263,7 +263,7 @@ fn start(scenario: &Scenario<f32>, folder: &Path) -> Debugged {
         .unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Goes on to the first PWM interrupt and gives its address, with a breakpoint there.
+/// Continues to the first PWM interrupt and returns its address, with a breakpoint there.
 fn to_interrupt(run: &mut Debugged) -> u32 {
     let image = board_image(STM32F405.board(), "ecu");
     let interrupt = image.address_of("SysTick").expect("it has the interrupt");

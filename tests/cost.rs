@@ -1,4 +1,4 @@
-//! What Rust costs on the target: the model's step and the ECU program's tasks beside the same in C, whose bits are equal.
+//! Cost of Rust on the target: the model's step and the ECU program's tasks beside the C reference, whose bits are equal.
 
 use qemu::Machine;
 use std::collections::BTreeMap;
@@ -6,8 +6,9 @@ use std::process::Command;
 use tests::golden::{Figure, check_figures};
 use tests::{TIME_OUT, image, run};
 
-/// The firmware's build takes the same; `cargo xtask target-cost` says how to install it.
+/// The image's build uses the same; `cargo xtask target-cost` prints how to install it.
 const C_COMPILER: &str = "arm-none-eabi-gcc";
+const IMAGE: &str = "c-reference";
 /// Instructions of a call.
 type Counted = BTreeMap<String, u32>;
 
@@ -36,13 +37,13 @@ fn c_compiler() -> Option<String> {
     text.lines().next().map(str::to_owned)
 }
 
-/// What the image counted, by function and language; its exit code is 0 only if all bits were equal.
+/// The image's counts, by function and language; its exit code is 0 only if all bits were equal.
 fn count(settings: &str) -> BTreeMap<(String, String), Counted> {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let words = settings.split_whitespace().map(str::to_owned);
     let words: Vec<String> = words.collect();
     let machine = Machine::Mps2An386;
-    let finished = run(&image("cost"), machine, &words, folder.path(), TIME_OUT)
+    let finished = run(&image(IMAGE), machine, &words, folder.path(), TIME_OUT)
         .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(finished.exit_code, 0, "{settings}: {:#?}", finished.log);
     finished.log.iter().filter_map(|line| cost(line)).collect()
@@ -50,8 +51,8 @@ fn count(settings: &str) -> BTreeMap<(String, String), Counted> {
 
 /// `... cost FUNCTION LANGUAGE name number name number ...`
 fn cost(line: &str) -> Option<((String, String), Counted)> {
-    let (_, told) = line.split_once(" cost ")?;
-    let mut words = told.split_whitespace();
+    let (_, figures) = line.split_once(" cost ")?;
+    let mut words = figures.split_whitespace();
     let call = (words.next()?.to_owned(), words.next()?.to_owned());
     let mut counted = Counted::new();
     while let (Some(name), Some(number)) = (words.next(), words.next()) {
@@ -92,8 +93,8 @@ fn rust_takes_no_more_instructions_than_c() {
         println!("{:36} {:>6} {}", figure.name, figure.value, figure.unit);
     }
     let about = "Instructions (no cycles) of a call on the board mps2: Rust, the same in C, and the greatest of the three ratios.\n\
-         Scenarios: no dither, square wave, sine. docs/cost.md says what is counted.";
-    let compilers = format!("{}; {c_compiler}", image("cost").compiler);
+         Scenarios: no dither, square wave, sine. docs/cost.md describes the count.";
+    let compilers = format!("{}; {c_compiler}", image(IMAGE).compiler);
     check_figures("cost.txt", about, &compilers, &figures);
 }
 

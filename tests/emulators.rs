@@ -1,5 +1,5 @@
-//! Programs that are called as the emulator and are none, or fail as one may: the host neither believes nor waits for them, and
-//! leaves nothing of them behind.
+//! Programs that are called as the emulator and are none, or fail as one may: the host neither believes nor waits for
+//! them, and leaves nothing of them behind.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -173,7 +173,7 @@ fn peak_kb(child: &Child) -> Option<u64> {
     line.split_whitespace().nth(1)?.parse().ok()
 }
 
-/// A signal reaches this program alone; the emulator ends with it all the same.
+/// A signal reaches this program alone; the emulator ends with it nevertheless.
 #[test]
 fn the_emulator_ends_with_this_program() {
     for (test, arguments) in [
@@ -220,7 +220,7 @@ fn the_emulator_ends_with_this_program() {
     }
 }
 
-/// The sections' table is what a strip takes away; the emulator needs none.
+/// `strip` removes the sections' table; the emulator needs none.
 #[test]
 fn an_image_without_symbols_runs_without_log() {
     let real = tempfile::tempdir().expect("a temporary folder can be made");
@@ -241,7 +241,7 @@ fn an_image_without_symbols_runs_without_log() {
     assert_eq!(code, Some(0), "{message}");
     assert_eq!(output.stdout, b"", "no raw bytes");
     assert!(message.contains("no defmt symbols"), "{message}");
-    // Nobody can say whether this run is complete.
+    // It is unknown whether this run is complete.
     let in_loop = ["pil", "--time", "0.1", "--firmware", "stripped"];
     assert_could_not_run(run(&real, &in_loop), &["no defmt symbols"]);
     let verify = ["verify", "--out", "report", "--firmware", "stripped"];

@@ -36,7 +36,7 @@ fn span(yaw_rate_turns: bool) -> Span {
     }
 }
 
-// What is counted: each runs alone in a process of its own.
+// The counted work: each runs alone in a process of its own.
 
 #[test]
 #[ignore = "counted by the test below"]
@@ -76,7 +76,7 @@ fn friction() {
 
 /// Instructions of this program when it runs one of the above.
 fn instructions(test: &str) -> u64 {
-    let program = std::env::current_exe().expect("a test knows its program");
+    let program = std::env::current_exe().expect("a test has its program's path");
     let output = Command::new(COUNTER)
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
         .arg(program)
@@ -84,12 +84,12 @@ fn instructions(test: &str) -> u64 {
         .env("RAYON_NUM_THREADS", "1")
         .output()
         .expect("it was there a moment ago");
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{told}");
-    let line = told.lines().find(|line| line.contains("Collected : "));
+    let messages = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{messages}");
+    let line = messages.lines().find(|line| line.contains("Collected : "));
     let count = line.and_then(|line| line.split("Collected : ").nth(1));
     let count = count.and_then(|digits| digits.trim().parse().ok());
-    count.unwrap_or_else(|| panic!("no count in: {told}"))
+    count.unwrap_or_else(|| panic!("no count in: {messages}"))
 }
 
 fn version(program: &str) -> Option<String> {

@@ -44,8 +44,8 @@ fn python() -> PathBuf {
     })
 }
 
-/// Asks tests/python/check_frames.py; an answer, as its words, for every question.
-fn ask(questions: &[String]) -> Vec<Vec<String>> {
+/// Queries tests/python/check_frames.py; an answer, as its words, for every question.
+fn query(questions: &[String]) -> Vec<Vec<String>> {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut child = Command::new(python())
         // Isolated: no other packages by way of the environment.
@@ -57,7 +57,7 @@ fn ask(questions: &[String]) -> Vec<Vec<String>> {
         .spawn()
         .expect("Python starts");
     let mut input = child.stdin.take().expect("stdin is piped");
-    // A script that ended early says why on its own; its exit code is the answer.
+    // A script that ended early prints the reason itself; its exit code is the answer.
     let _ = input.write_all(questions.join("\n").as_bytes());
     drop(input);
     let output = child.wait_with_output().expect("Python ends");
@@ -139,7 +139,7 @@ impl Value {
         Self::Text(value.to_string())
     }
 
-    /// Whether `other` says the same: numbers to the bit, NaN as a class.
+    /// Whether `other` is the same: numbers to the bit, NaN as a class.
     fn is(&self, other: &str) -> bool {
         match self {
             Self::Text(text) => text == other,
@@ -183,7 +183,7 @@ fn actuator_signals(a: &Actuation<f32>) -> Signals {
     ]
 }
 
-/// The frames of one sender of each kind, with what is in them.
+/// The frames of one sender of each kind, with their content.
 fn frames() -> Vec<(Kind, FrameBytes, Signals)> {
     let mut rng = Rng::with_seed(4);
     let mut sender = Sender::new(SENSOR_DATA_ID);
@@ -215,7 +215,8 @@ fn bytes_checks_and_signals_are_those_of_python() {
         .iter()
         .map(|(kind, frame, _)| question(*kind, frame))
         .collect();
-    for (index, ((kind, frame, signals), answer)) in frames.iter().zip(ask(&questions)).enumerate()
+    for (index, ((kind, frame, signals), answer)) in
+        frames.iter().zip(query(&questions)).enumerate()
     {
         let context = format!("{} {index}: {answer:?}", kind.0);
         let [protected, verdict, decoded @ ..] = &answer[..] else {
@@ -258,7 +259,7 @@ fn damaged_and_foreign_frames_are_bad_for_both() {
         .map(|(kind, frame)| question(*kind, frame))
         .collect();
     let mut errors = 0;
-    for ((kind, frame), answer) in received.iter().zip(ask(&questions)) {
+    for ((kind, frame), answer) in received.iter().zip(query(&questions)) {
         let status = Receiver::new(kind.1, MAX_DELTA_COUNTER).check(Some(frame));
         let verdict = if status == Status::Error {
             "error"
@@ -281,7 +282,7 @@ fn dbc_file_has_the_constants() {
     let kinds = [SENSOR, ACTUATOR];
     for ((_, data_id), answer) in kinds
         .iter()
-        .zip(ask(&kinds.map(|(name, _)| name.to_owned())))
+        .zip(query(&kinds.map(|(name, _)| name.to_owned())))
     {
         let expected = format!(
             "can_fd=True length={FRAME_LEN} profile=PROFILE_05 data_id={data_id} max_delta_counter={MAX_DELTA_COUNTER}"
@@ -290,7 +291,7 @@ fn dbc_file_has_the_constants() {
     }
 }
 
-/// A link that loses, repeats, reorders, damages and confuses frames; both receivers say the same of each.
+/// A link that loses, repeats, reorders, damages and confuses frames; both receivers agree on each.
 #[test]
 fn statuses_are_those_of_another_crate() {
     let mut rng = Rng::with_seed(6);

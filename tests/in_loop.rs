@@ -1,5 +1,5 @@
-//! The firmware in the loop: the same commands as the program on the host, over every link and on every board that the emulator
-//! has, twice the same bytes, and a clear end where the firmware is dead.
+//! The firmware in the loop: the same commands as the program on the host, over every link and on every board that the
+//! emulator has, twice the same bytes, and a clear end where the firmware is dead.
 
 use pil::drive::{Drive, ecu_scenario};
 use pil::ecu::Software;
@@ -70,7 +70,7 @@ fn assert_agree(levels: &Levels) {
         .actuations
         .last()
         .expect("there are ticks");
-    let last = last.expect("the ECU has told");
+    let last = last.expect("the ECU has reported");
     assert_eq!(
         (last.mode, last.faults),
         (Mode::Active, 0),
@@ -178,7 +178,7 @@ fn one_changed_bit_of_a_command_is_seen() {
     );
     changed.truncate(100);
     assert!(!compare(&exchanges[..7], &changed[..8], Depth::Bytes).is_equal());
-    // What the ECU told at that frame is readable: the comparison is not one of zeros.
+    // The ECU's report at that frame is readable: the comparison is not one of zeros.
     let frame = exchanges[at].from_ecu.frame.expect("as found above");
     assert!(
         decode_actuation(&frame)

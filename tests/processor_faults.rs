@@ -1,5 +1,5 @@
-//! Faults of the ECU's processor, done to the firmware through the emulator's gdb stub; and faults between vehicle and ECU, which
-//! the firmware takes as the host's program does, bit for bit.
+//! Faults of the ECU's processor, done to the firmware through the emulator's gdb stub; and faults between vehicle and
+//! ECU, which the firmware takes as the host's program does, bit for bit.
 
 use pil::fault::campaign::Row;
 use pil::fault::catalogue::{self, Kind};
@@ -116,8 +116,8 @@ fn a_reset_begins_anew() {
     let first = first.expect("a frame comes");
     let [_, _, counter, ..] = first;
     assert_eq!(counter, 0);
-    let told = decode_actuation(&first).expect("the mode is known");
-    assert_eq!((told.mode, told.faults), (Mode::Starting, 0));
+    let actuation = decode_actuation(&first).expect("the mode is known");
+    assert_eq!((actuation.mode, actuation.faults), (Mode::Starting, 0));
 }
 
 /// One fault of each kind between vehicle and ECU.

@@ -1,4 +1,4 @@
-//! What is shown of the firmware's images: worst stack, size, instructions of the tasks, spacing of interrupts.
+//! Proofs about the firmware's images: worst stack, size, instructions of the tasks, jitter of the interrupts.
 
 use image::Image;
 use image::memory::Map;
@@ -19,7 +19,7 @@ use tests::golden::{Figure, check_figures};
 use tests::{TIME_OUT, board_image, framed_image, image, record, root, scenario};
 
 const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
-/// What the ECU's program may take of any board, bytes: limits of this project, far below what the boards have.
+/// Memory that the ECU's program may use on any board, bytes: limits of this project, far below what the boards have.
 const STACK_LIMIT_BYTES: u32 = 16 * 1024;
 const FLASH_LIMIT_BYTES: u32 = 128 * 1024;
 const RAM_LIMIT_BYTES: u32 = 64 * 1024;
@@ -59,7 +59,7 @@ fn worst_stack() {
     for board in BOARDS {
         let framed = framed_image(board);
         let stack = proven_stack(board, &framed);
-        // Two independent sources: what the compiler states, and what the instructions take.
+        // Two independent sources: the compiler's figures, and the instructions.
         assert!(
             10 * stack.confirmed_functions >= 9 * stack.stated_functions,
             "{board}: {} of {} frames confirmed",
@@ -245,7 +245,7 @@ fn instructions_per_tick() {
 const INTERRUPTS: f32 = 1e5;
 
 #[test]
-fn spacing_of_interrupts() {
+fn jitter_of_interrupts() {
     let mut figures = Vec::new();
     for pwm_rate_hz in [10_000.0, 20_000.0, 50_000.0_f32] {
         let mut scenario = scenario(Waveform::Sine, Application::Averaged);
@@ -254,8 +254,8 @@ fn spacing_of_interrupts() {
         let recording = record(&scenario, Machine::Mps2An386, 0);
         assert!(recording.duties.len() as f32 >= INTERRUPTS);
         let (least, most) = (
-            recording.trailer.least_spacing,
-            recording.trailer.most_spacing,
+            recording.trailer.min_interval,
+            recording.trailer.max_interval,
         );
         let nominal = f32::from(recording.header.pwm_period);
         assert!(

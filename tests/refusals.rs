@@ -77,7 +77,7 @@ fn bad_scenarios_are_refused_by_name() {
     }
 }
 
-/// What the host says of the same settings, which it takes by the same code in the same arithmetic.
+/// The host's message for the same settings, which it parses by the same code in the same arithmetic.
 fn host(settings: &[String]) -> Option<String> {
     let mut scenario = Scenario::<f32>::reconstruction();
     for setting in settings {
@@ -96,7 +96,8 @@ fn words(sentence: &str) -> Vec<String> {
     sentence.split_whitespace().map(word).collect()
 }
 
-/// The settings that the host refuses are those that the firmware refuses, in the same words with the same values and bounds.
+/// The settings that the host refuses are those that the firmware refuses, in the same words with the same values and
+/// bounds.
 #[test]
 fn host_and_firmware_refuse_the_same_in_the_same_words() {
     let mut cases: Vec<Vec<String>> = Vec::new();
@@ -128,8 +129,8 @@ fn host_and_firmware_refuse_the_same_in_the_same_words() {
         let settings: Vec<&str> = case.iter().map(String::as_str).collect();
         let (exit_code, line) = outcome(&settings);
         assert_eq!(exit_code, BAD_SCENARIO, "{case:?}: {line}");
-        let (_, said) = line.split_once("scenario refused: ").unwrap_or(("", &line));
-        assert_eq!(words(said), words(&expected), "{case:?}");
+        let (_, message) = line.split_once("scenario refused: ").unwrap_or(("", &line));
+        assert_eq!(words(message), words(&expected), "{case:?}");
     }
 }
 

@@ -7,7 +7,14 @@ use std::path::{Path, PathBuf};
 use tests::golden::check_text;
 use tests::root;
 
-const CRATES: [&str; 5] = ["shared-model", "firmware", "sim-host", "tests", "xtask"];
+const CRATES: [&str; 6] = [
+    "benches/c-reference",
+    "shared-model",
+    "firmware",
+    "sim-host",
+    "tests",
+    "xtask",
+];
 const REASON: &str = "SAFETY:";
 
 /// One use of the word.
@@ -15,9 +22,9 @@ const REASON: &str = "SAFETY:";
 struct Use {
     /// Line, from 1.
     line: usize,
-    /// What is unsafe.
+    /// Kind of the unsafe code.
     kind: &'static str,
-    /// Why it is sound; `None` where nobody says.
+    /// Why it is sound; `None` without a comment.
     reason: Option<String>,
 }
 

@@ -16,17 +16,17 @@ const LINK: &str = "link=";
 /// Key of a preset, which replaces the whole scenario.
 const PRESET: &str = "preset=";
 
-/// What the command line asks for.
+/// Content of the command line.
 pub struct Command {
     /// The scenario, not yet validated.
     pub scenario: Scenario<f32>,
-    /// Path of the telemetry file on the host, if telemetry is wanted.
+    /// Path of the telemetry file on the host, if telemetry is requested.
     pub telemetry: Option<&'static str>,
     /// Name of the link to a vehicle, if the ECU is to steer one.
     pub link: Option<&'static str>,
 }
 
-/// Why the command line was refused.
+/// Reason why the command line was refused.
 pub enum CommandError {
     /// The host gives none, or a longer one than the buffer holds.
     Unreadable,
@@ -42,7 +42,7 @@ pub fn read() -> Result<Command, CommandError> {
     parse(text().ok_or(CommandError::Unreadable)?)
 }
 
-/// The command line; `None` if the host has none or a longer one than the buffer, or at a second call.
+/// The command line; `None` if the host has none or a longer one than the buffer, or at the second call.
 pub fn text() -> Option<&'static str> {
     let buffer = cortex_m::singleton!(: [u8; MAX_BYTES] = [0; MAX_BYTES])?;
     let mut block = [buffer.as_mut_ptr() as usize, MAX_BYTES];

@@ -1,6 +1,6 @@
-//! Exit codes: how a run ended, as the host sees it.
+//! Exit codes of a run, for the host.
 
-/// Why the firmware ends.
+/// Reason for the end of the firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum ExitCode {
@@ -10,7 +10,7 @@ pub enum ExitCode {
     BadScenario = 10,
     /// The telemetry file cannot be written.
     TelemetryFailed = 11,
-    /// Records or duty codes were lost, or a control task was not done in its period.
+    /// Records or duty codes were lost, or a control task exceeded its period.
     Overrun = 12,
     /// The program panicked.
     Panic = 13,
@@ -18,12 +18,10 @@ pub enum ExitCode {
     HardFault = 14,
     /// The watchdog was not fed.
     Watchdog = 15,
-    /// An interrupt that nobody expects.
+    /// An interrupt without a handler.
     UnexpectedInterrupt = 16,
     /// The link to the vehicle cannot be opened, or does not answer.
     LinkLost = 17,
-    /// The program's twin in C gave other bits.
-    Unequal = 18,
 }
 
 /// SYS_EXIT_EXTENDED, the exit that takes a code along.
@@ -36,7 +34,7 @@ pub fn exit(code: ExitCode) -> ! {
     let block = [APPLICATION_EXIT, code as usize];
     // SAFETY: the operation reads the two words of the block, which live until it returns.
     unsafe { cortex_m_semihosting::syscall1(EXIT_EXTENDED, block.as_ptr() as usize) };
-    // Where nobody listens: stay, with the PWM as it is.
+    // Without a debugger: stay, with the PWM as it is.
     loop {
         cortex_m::asm::wfi();
     }

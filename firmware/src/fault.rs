@@ -15,8 +15,8 @@ pub fn end_safely(code: ExitCode) -> ! {
     exit(code)
 }
 
-/// Takes the whole stack for its own: after an overflow there is none left.
-// SAFETY: sets the stack pointer to the top of the stack and goes on; what was on the stack is not needed any more, as nothing
+/// Uses the whole stack from its top: after an overflow there is none left.
+// SAFETY: sets the stack pointer to the top of the stack and continues; the former stack is not needed any more, as nothing
 // returns from here.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
@@ -30,7 +30,8 @@ unsafe extern "C" fn hard_fault() -> ! {
     )
 }
 
-// SAFETY: the one function of that name. It has one for the sake of the stack's bound, which begins here, behind the assembly.
+// SAFETY: the one function of that name. It has one for the sake of the stack's bound, which begins here, after the
+// assembly.
 #[unsafe(no_mangle)]
 extern "C" fn end_hard_fault() -> ! {
     end_safely(ExitCode::HardFault)

@@ -40,7 +40,7 @@ impl HostFile {
         if path.len() == name.len() {
             return Err(HostFileError);
         }
-        // SAFETY: the operation reads path.len() bytes of the name and the zero behind them.
+        // SAFETY: the operation reads path.len() bytes of the name and the zero after them.
         let handle = unsafe { syscall!(OPEN, name.as_ptr(), mode, path.len()) };
         if handle == usize::MAX {
             return Err(HostFileError);

@@ -1,4 +1,4 @@
-//! The log: defmt frames to the host's console, one write a frame.
+//! The log: defmt frames to the host's console, one write per frame.
 //!
 //! The stock semihosting logger writes each frame in many small operations, each a trap into the emulator. This one
 //! gathers a frame first. Fault handlers do not log: they may have interrupted a frame.
@@ -85,7 +85,7 @@ unsafe impl defmt::Logger for Logger {
     // SAFETY: does nothing.
     unsafe fn flush() {}
 
-    // SAFETY: defmt calls it only behind acquire, as the trait demands.
+    // SAFETY: defmt calls it only after acquire, as the trait demands.
     unsafe fn release() {
         // SAFETY: the critical section of acquire is still held.
         let frame = unsafe { &mut *FRAME.0.get() };
@@ -104,4 +104,4 @@ unsafe impl defmt::Logger for Logger {
     }
 }
 
-defmt::timestamp!("{=u32:ms}", crate::tasks::elapsed_ms());
+defmt::timestamp!("{=u32:ms}", crate::clock::elapsed_ms());

@@ -1,9 +1,10 @@
 //! Telemetry: rings from the interrupts to the main loop, and the stream from there to the host.
 
 use crate::board::{Board, Current};
+use crate::counters::{count_overrun, overruns, saturate};
 use crate::exit::ExitCode;
 use crate::host_file::{HostFile, HostFileError};
-use crate::{spacing, stack, tasks};
+use crate::{jitter, stack};
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use critical_section::Mutex;
@@ -22,17 +23,6 @@ static RECORDED: Mutex<Cell<Option<Producer<'static, u16, DUTY_RING>>>> =
     Mutex::new(Cell::new(None));
 static FILE: AtomicUsize = AtomicUsize::new(NOT_OPEN);
 static RECORDS: AtomicU32 = AtomicU32::new(0);
-static OVERRUNS: AtomicU32 = AtomicU32::new(0);
-
-/// Counts a record or duty code that was lost, or a task that was late. Any of them fails the run.
-pub fn count_overrun() {
-    OVERRUNS.fetch_add(1, Ordering::Relaxed);
-}
-
-/// Overruns so far.
-pub fn overruns() -> u32 {
-    OVERRUNS.load(Ordering::Relaxed)
-}
 
 /// Where the PWM interrupt puts the duty codes that the PWM holds.
 pub struct DutyRecording(Producer<'static, u16, DUTY_RING>);
@@ -74,7 +64,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// The rings, and the stream if there is a `path`, with its header written. `None` if called a second time.
+    /// The rings, and the stream if there is a `path`, with its header written. `None` at the second call.
     ///
     /// # Errors
     /// If the host cannot write the file.
@@ -137,7 +127,7 @@ impl Recorder {
         Ok(true)
     }
 
-    /// Writes what is gathered.
+    /// Writes the gathered bytes.
     ///
     /// # Errors
     /// If the host cannot write the file.
@@ -151,8 +141,8 @@ impl Recorder {
     }
 }
 
-/// Writes the trailer, if a stream is open. Works from any handler: it needs no recorder, and what the recorder has
-/// gathered and not written is lost.
+/// Writes the trailer, if a stream is open. Works from any handler: it needs no recorder; bytes that the recorder has
+/// gathered and not written are lost.
 ///
 /// # Errors
 /// If the host cannot write the file.
@@ -162,7 +152,7 @@ pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
         return Ok(());
     }
     let (final_duty, neutral_duty) = Current::pwm_output();
-    let (least_spacing, most_spacing) = spacing::extremes();
+    let (min_interval, max_interval) = jitter::interval_range();
     let trailer = Trailer {
         exit_code: code as u32,
         records: RECORDS.load(Ordering::Relaxed),
@@ -170,8 +160,8 @@ pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
         stack_bytes: stack::deepest_bytes(),
         final_duty,
         neutral_duty,
-        least_spacing: tasks::saturate(least_spacing),
-        most_spacing: tasks::saturate(most_spacing),
+        min_interval: saturate(min_interval),
+        max_interval: saturate(max_interval),
     };
     let mut bytes = [0; TRAILER_LEN];
     trailer.encode(&mut bytes);

@@ -1,7 +1,7 @@
-//! The stack: what overflows is caught, and its deepest use is known.
+//! The stack: an overflow is detected, and its deepest use is measured.
 //!
 //! It lies at the start of the RAM, and the memory protection unit lets nothing into the addresses below, which on some
-//! machines take writes without a fault. What is free of it is painted at the start and looked at in the end.
+//! machines take writes without a fault. Its free part is painted at the start and inspected at the end.
 
 use core::ptr::{read_volatile, write_volatile};
 
@@ -50,12 +50,12 @@ pub fn guard() {
     cortex_m::asm::isb();
 }
 
-/// Paints what is free below the present stack.
+/// Paints the free part below the present stack.
 pub fn paint() {
     let (bottom, _) = bounds();
     let here = cortex_m::register::msp::read() as usize;
     for address in (bottom..here.saturating_sub(MARGIN)).step_by(4) {
-        // SAFETY: between the stack's end and the stack in use, memory that belongs to nobody.
+        // SAFETY: between the stack's end and the stack in use, unused memory.
         unsafe { write_volatile(address as *mut u32, PAINT) };
     }
 }

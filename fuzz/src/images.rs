@@ -1,6 +1,6 @@
 //! Images of the firmware, and the log that one of them writes.
 
-use crate::{Target, as_it_is};
+use crate::target::{Target, as_it_is};
 use image::Image;
 use image::stack::Stack;
 use object::write::{Object, Symbol, SymbolSection};

@@ -1,6 +1,6 @@
 //! What comes over links: packets on a serial line, and frames protected end to end.
 
-use crate::Target;
+use crate::target::Target;
 use shared_model::e2e::{Receiver, Sender};
 use shared_model::exchange::{
     FRAME_LEN, FrameBytes, Packet, TO_ECU_LEN, TO_HOST_LEN, ToEcu, ToHost,

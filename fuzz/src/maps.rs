@@ -1,6 +1,6 @@
-//! What a map is kept in: tiles, and the Parquet file that a schedule begins with.
+//! Files of a map: tiles, and the Parquet file that a schedule begins with.
 
-use crate::{Target, as_it_is};
+use crate::target::{Target, as_it_is};
 use dynamics::map::cell::{Cell, cells};
 use dynamics::map::plan::{Grid, Plan, Sheet, Start};
 use dynamics::map::{table, tiles};

@@ -1,6 +1,6 @@
 //! Mutations at random, from a seed: the same in every run and on every machine.
 
-use crate::Target;
+use crate::target::Target;
 use fastrand::Rng;
 
 /// Numbers at which counters and lengths break.

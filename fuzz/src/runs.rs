@@ -1,6 +1,6 @@
-//! What the firmware tells: telemetry, and all that passes in the loop.
+//! Data from the firmware: telemetry, and the exchange in the loop.
 
-use crate::Target;
+use crate::target::Target;
 use pil::drive::{Drive, ecu_scenario};
 use pil::ecu::Software;
 use pil::equivalence::trace_of;
@@ -98,8 +98,8 @@ fn stream(samples_per_step: u16, records: u32) -> Vec<u8> {
         stack_bytes: 3020,
         final_duty: 1250,
         neutral_duty: 1250,
-        least_spacing: 2500,
-        most_spacing: 2500,
+        min_interval: 2500,
+        max_interval: 2500,
     };
     let mut bytes = vec![0; HEADER_LEN];
     header.encode(&mut bytes);

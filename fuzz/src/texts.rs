@@ -1,6 +1,6 @@
-//! Texts: configurations, manoeuvres, settings, and what a reproduction keeps of its work.
+//! Texts: configurations, manoeuvres, settings, and the records of a reproduction.
 
-use crate::{Target, as_it_is};
+use crate::target::{Target, as_it_is};
 use dynamics::config;
 use pil::drive::{Drive, ecu_scenario};
 use pil::ecu::Software;

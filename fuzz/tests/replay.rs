@@ -72,7 +72,7 @@ replays! {
     telemetry recording tile parquet configuration manoeuvre record settings serial frames elf log
 }
 
-/// What a reader takes is what is counted.
+/// The counted memory is the reader's.
 #[test]
 fn a_reader_that_takes_too_much_is_found() {
     let greedy = Target {

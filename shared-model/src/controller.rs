@@ -2,89 +2,12 @@
 //! amplitude. The gate that guards it shares no code with it.
 
 use crate::Real;
-use crate::parameter::{Field, ParameterSet};
+use crate::ecu_schedule::Table;
+use crate::policy::Policy;
 use crate::scenario::Scenario;
-use crate::schedule::Table;
 use crate::signal::Measurement;
 
-/// When the dither is on, and how fast commands may move.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Policy<T> {
-    /// Wheel speed below which there is no dither, rpm.
-    pub dither_off_below_rpm: T,
-    /// The dither comes on again this much above that speed, rpm.
-    pub hysteresis_rpm: T,
-    /// Time in which the schedule's greatest amplitude comes in and goes out, s.
-    pub dither_ramp_s: T,
-    /// Greatest motor current that a request gets, A.
-    pub motor_current_a: T,
-    /// Greatest change of the motor current, A/s.
-    pub motor_slew_a_per_s: T,
-}
-
-impl<T: Real> Policy<T> {
-    /// The policy for the preset `reconstruction`.
-    pub fn reconstruction() -> Self {
-        Self {
-            dither_off_below_rpm: T::from_f64(1530.0),
-            hysteresis_rpm: T::from_f64(20.0),
-            dither_ramp_s: T::from_f64(0.5),
-            motor_current_a: T::from_f64(14.0),
-            motor_slew_a_per_s: T::from_f64(10.0),
-        }
-    }
-
-    /// The same policy in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Policy<U> {
-        Policy {
-            dither_off_below_rpm: f(self.dither_off_below_rpm),
-            hysteresis_rpm: f(self.hysteresis_rpm),
-            dither_ramp_s: f(self.dither_ramp_s),
-            motor_current_a: f(self.motor_current_a),
-            motor_slew_a_per_s: f(self.motor_slew_a_per_s),
-        }
-    }
-}
-
-impl<T: Real> ParameterSet<T> for Policy<T> {
-    const SECTION: &'static str = "policy";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "dither_off_below_rpm",
-            min: 0.0,
-            max: 1e5,
-            place: |p| &mut p.dither_off_below_rpm,
-        },
-        Field {
-            name: "hysteresis_rpm",
-            min: 0.0,
-            max: 1e4,
-            place: |p| &mut p.hysteresis_rpm,
-        },
-        Field {
-            name: "dither_ramp_s",
-            min: 1e-3,
-            max: 100.0,
-            place: |p| &mut p.dither_ramp_s,
-        },
-        Field {
-            name: "motor_current_a",
-            min: 0.0,
-            max: 1000.0,
-            place: |p| &mut p.motor_current_a,
-        },
-        Field {
-            name: "motor_slew_a_per_s",
-            min: 1e-3,
-            max: 1e6,
-            place: |p| &mut p.motor_slew_a_per_s,
-        },
-    ];
-}
-
-/// What the controller asks for until the next control tick.
+/// Command of the controller until the next control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command<T> {
     /// Motor's share of the servo voltage, V.
@@ -93,7 +16,7 @@ pub struct Command<T> {
     pub dither_amplitude_v: T,
 }
 
-/// The controller, run once a control tick.
+/// The controller, run once per control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Controller<T> {
     policy: Policy<T>,

@@ -5,58 +5,65 @@
 //! holds.
 
 use crate::Real;
-use crate::parameter::{Field, ParameterSet};
+use crate::listed;
+use crate::parameter::parameters;
 
 /// Greatest error of the oscillator's sine on the ECU (micromath in f32), measured over all phases by a test of this
 /// module. It is 1.1 mV at an amplitude of 1 V, a ninth of one PWM step of the presets.
 pub const OSCILLATOR_SINE_ERROR: f64 = 1.2e-3;
 
-/// Shape of the dither.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Waveform {
-    /// No dither.
-    None,
-    /// Square wave of equal halves, equation (21).
-    Square,
-    /// Sine, equation (23).
-    Sine,
+listed! {
+    /// Shape of the dither.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+    pub enum Waveform {
+        /// No dither.
+        None => "none",
+        /// Square wave of equal halves, equation (21).
+        Square => "square",
+        /// Sine, equation (23).
+        Sine => "sine",
+    }
 }
 
-/// How the dither reaches the model.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Application {
-    /// As effective nonlinearity, the model stepped at the control rate.
-    Averaged,
-    /// As the true signal, the model stepped at the PWM rate.
-    Signal,
+listed! {
+    /// How the dither reaches the model.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+    pub enum Application {
+        /// As effective nonlinearity, the model stepped at the control rate.
+        Averaged => "averaged",
+        /// As the true signal, the model stepped at the PWM rate.
+        Signal => "signal",
+    }
 }
 
-/// The dither's parameters.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Dither<T> {
-    /// Shape.
-    pub waveform: Waveform,
-    /// How it reaches the model.
-    pub application: Application,
-    /// Amplitude W, V.
-    pub amplitude_v: T,
-    /// Angular frequency of the square wave, rad/s.
-    pub square_frequency_rad_per_s: T,
-    /// Angular frequency of the sine, rad/s.
-    pub sine_frequency_rad_per_s: T,
-    /// Time at which the dither sets in, s.
-    pub start_time_s: T,
-    /// Angle that one volt of square wave adds ahead of the nonlinearities, rad/V. The paper uses volts as an angle and
-    /// gives no conversion.
-    pub square_rad_per_volt: T,
-    /// The same for the sine.
-    pub sine_rad_per_volt: T,
+parameters! {
+    section "dither";
+    /// The dither's parameters.
+    pub struct Dither {
+        choices {
+            /// Shape.
+            waveform: Waveform,
+            /// How it reaches the model.
+            application: Application,
+        }
+        /// Amplitude W, V.
+        amplitude_v: 0.0..=1000.0,
+        /// Angular frequency of the square wave, rad/s.
+        square_frequency_rad_per_s: 1.0..=1e6,
+        /// Angular frequency of the sine, rad/s.
+        sine_frequency_rad_per_s: 1.0..=1e6,
+        /// Start time of the dither, s.
+        start_time_s: 0.0..=1e5,
+        /// Angle that one volt of square wave adds ahead of the nonlinearities, rad/V. The paper uses volts as an angle and
+        /// gives no conversion.
+        square_rad_per_volt: 0.0..=100.0,
+        /// The same for the sine.
+        sine_rad_per_volt: 0.0..=100.0,
+    }
 }
 
 impl<T: Real> Dither<T> {
@@ -98,7 +105,7 @@ impl<T: Real> Dither<T> {
         self.amplitude_v * rad_per_volt
     }
 
-    /// What the nonlinearities see once the dither is on: the mean over its period, or `sample` (in units of the
+    /// Effect on the nonlinearities once the dither is on: the mean over its period, or `sample` (in units of the
     /// amplitude) held over one step.
     pub fn injection(&self, sample: T) -> Injection<T> {
         let amplitude = self.amplitude_rad();
@@ -111,65 +118,9 @@ impl<T: Real> Dither<T> {
             (Waveform::Sine, Application::Averaged) => Injection::SineMean { amplitude },
         }
     }
-
-    /// The same parameters in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Dither<U> {
-        Dither {
-            waveform: self.waveform,
-            application: self.application,
-            amplitude_v: f(self.amplitude_v),
-            square_frequency_rad_per_s: f(self.square_frequency_rad_per_s),
-            sine_frequency_rad_per_s: f(self.sine_frequency_rad_per_s),
-            start_time_s: f(self.start_time_s),
-            square_rad_per_volt: f(self.square_rad_per_volt),
-            sine_rad_per_volt: f(self.sine_rad_per_volt),
-        }
-    }
 }
 
-impl<T: Real> ParameterSet<T> for Dither<T> {
-    const SECTION: &'static str = "dither";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "amplitude_v",
-            min: 0.0,
-            max: 1000.0,
-            place: |p| &mut p.amplitude_v,
-        },
-        Field {
-            name: "square_frequency_rad_per_s",
-            min: 1.0,
-            max: 1e6,
-            place: |p| &mut p.square_frequency_rad_per_s,
-        },
-        Field {
-            name: "sine_frequency_rad_per_s",
-            min: 1.0,
-            max: 1e6,
-            place: |p| &mut p.sine_frequency_rad_per_s,
-        },
-        Field {
-            name: "start_time_s",
-            min: 0.0,
-            max: 1e5,
-            place: |p| &mut p.start_time_s,
-        },
-        Field {
-            name: "square_rad_per_volt",
-            min: 0.0,
-            max: 100.0,
-            place: |p| &mut p.square_rad_per_volt,
-        },
-        Field {
-            name: "sine_rad_per_volt",
-            min: 0.0,
-            max: 100.0,
-            place: |p| &mut p.sine_rad_per_volt,
-        },
-    ];
-}
-
-/// What the dither does to the argument of a nonlinearity during one step.
+/// Effect of the dither on the argument of a nonlinearity during one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Injection<T> {
     /// Nothing.
@@ -214,8 +165,8 @@ impl<T: Real> Injection<T> {
     }
 }
 
-/// Number of Gauss-Chebyshev nodes. They hold the mean of the Magic Formula of set A to 1e-6 of its peak up to an amplitude of
-/// 0.2 rad (the paper's largest is 0.19 rad), and to 2e-5 up to 0.3 rad.
+/// Number of Gauss-Chebyshev nodes. They hold the mean of the Magic Formula of set A to 1e-6 of its peak up to an
+/// amplitude of 0.2 rad (the paper's largest is 0.19 rad), and to 2e-5 up to 0.3 rad.
 const NODES: usize = 32;
 
 /// Mean of a function over a sine, equation (23), by Gauss-Chebyshev quadrature.
@@ -273,7 +224,7 @@ impl<T: Real> Default for SineMean<T> {
     }
 }
 
-/// Phase accumulator and waveform: one sample a PWM period.
+/// Phase accumulator and waveform: one sample per PWM period.
 ///
 /// The phase counts 2^-32 turns in an integer, so it neither drifts nor differs between machines. The frequency is met
 /// to half a count, 2^-33 of the sample rate.
@@ -299,18 +250,18 @@ impl Oscillator {
         }
     }
 
-    /// Angular frequency that the integer phase really has at `rate_hz`, rad/s.
+    /// Actual angular frequency of the integer phase at `rate_hz`, rad/s.
     pub fn frequency_rad_per_s(&self, rate_hz: f64) -> f64 {
         f64::from(self.increment) / COUNTS_PER_TURN * rate_hz * core::f64::consts::TAU
     }
 
-    /// The sample at the present phase, from -1 to 1 (0 without dither); then the phase moves on.
+    /// The sample at the present phase, from -1 to 1 (0 without dither); then the phase advances.
     ///
     /// ```
     /// use shared_model::{Scenario, dither::{Oscillator, Waveform}};
     /// let mut dither = Scenario::<f64>::reconstruction().dither;
     /// dither.waveform = Waveform::Sine;
-    /// // A quarter turn a sample.
+    /// // A quarter turn per sample.
     /// let rate_hz = 4000.0 / core::f64::consts::TAU * 4.0;
     /// let mut oscillator = Oscillator::new(&dither, rate_hz);
     /// let samples: [f64; 4] = core::array::from_fn(|_| oscillator.sample());

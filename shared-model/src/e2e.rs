@@ -1,15 +1,16 @@
 //! End-to-end protection of frames: AUTOSAR E2E profile 5, from the sender's memory to the receiver's.
 //!
-//! A frame begins with a CRC-16 (2 bytes, little-endian) and a counter (1 byte). The checksum also covers a data ID that is
-//! not sent, so that a frame taken for another one is found like a flipped bit; the counter tells loss, repetition and
-//! wrong order apart.
+//! A frame begins with a CRC-16 (2 bytes, little-endian) and a counter (1 byte). The checksum also covers a data ID that
+//! is not sent, so that a frame taken for another one is detected like a flipped bit; the counter distinguishes loss,
+//! repetition and wrong order.
+//!
 //! Source: AUTOSAR FO, "E2E Protocol Specification" (PRS_E2EProtocol), profile 5, with the header at offset 0.
 
 use crate::exchange::FrameBytes;
 
 const CHECKSUM: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
 
-/// Checksum of a frame behind its checksum field, then of the data ID, low byte first.
+/// Checksum of a frame after its checksum field, then of the data ID, low byte first.
 fn checksum(frame: &FrameBytes, data_id: u16) -> u16 {
     let [_, _, covered @ ..] = frame;
     let mut digest = CHECKSUM.digest();
@@ -45,7 +46,7 @@ impl Sender {
     }
 }
 
-/// What the check of one reception found.
+/// Result of the check of one reception.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
     /// Whole, and the one after the last whole frame.
@@ -58,7 +59,7 @@ pub enum Status {
     Error,
     /// Whole, with the counter of the last whole frame.
     Repeated,
-    /// Whole, with a counter too far ahead, or behind: too many lost, wrong order, or the sender started again.
+    /// Whole, with a counter too far ahead or back: too many lost, wrong order, or the sender started again.
     WrongSequence,
 }
 
@@ -94,7 +95,7 @@ impl Receiver {
         self.counter
     }
 
-    /// Checks what one reception brought, if it brought anything.
+    /// Checks one reception: a frame, or none.
     ///
     /// Every whole frame sets the counter that the next one is held against, so that after one
     /// [`Status::WrongSequence`] a sender that started again is followed.

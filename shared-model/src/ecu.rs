@@ -1,17 +1,17 @@
 //! The ECU's program in the loop: sensor frames in, duty codes and actuator frames out.
 //!
-//! The PWM task runs at the PWM rate, in an interrupt, and says when a control tick is due. The control task checks the
-//! sensor frame, runs the controller, and has the gate judge both. What it computes in one control tick acts from the next
-//! one on, however long it took, so that interrupts cannot change a result.
+//! The PWM task runs at the PWM rate, in an interrupt, and signals when a control tick is due. The control task checks the
+//! sensor frame, runs the controller, and passes both to the gate. Its result acts from the next control tick on, however
+//! long it took, so that the timing of interrupts cannot change a result.
 //!
-//! Both tasks run twice, on two sets of parameters and state in memory ([`duplex`]). Where the two differ, memory was
-//! changed, and the safe state follows; until it acts, the duty nearer to neutral goes out. The actuator frame is the first
-//! channel's, with the lower of both wheel speed limits. [`Ecu`] runs the tasks in turn on the host; firmware runs them at two priorities.
-//! Both give the same bits.
+//! Both tasks run twice, on two sets of parameters and state in memory (`dual_channel`). A mismatch indicates memory
+//! corruption and latches the safe state; until that acts, the duty closer to neutral is put out. The actuator frame is
+//! the first channel's, with the lower of both wheel speed limits. [`Ecu`] runs the tasks in turn on the host; firmware
+//! runs them at two priorities. Both give the same bits.
 
+mod consistency;
 mod control;
-mod duplex;
-mod fit;
+mod dual_channel;
 mod pwm;
 
 pub use control::{ControlInput, ControlOutput, ControlTask, Warning};
@@ -33,13 +33,13 @@ pub struct Ecu<T> {
 }
 
 impl<T: Real> Ecu<T> {
-    /// The program of a scenario; its independent clock counts `clock_hz` a second.
+    /// The program of a scenario; its independent clock runs at `clock_hz`.
     ///
     /// # Errors
-    /// If the scenario is not valid, or the gate would refuse what its controller commands.
+    /// If the scenario is not valid, or the gate would refuse its controller's commands.
     pub fn new(scenario: &Scenario<T>, clock_hz: u32) -> Result<Self, InvalidScenario> {
         scenario.validate()?;
-        fit::check(scenario)?;
+        consistency::check(scenario)?;
         Ok(Self {
             pwm: PwmTask::new(scenario),
             control: ControlTask::new(scenario, clock_hz),
@@ -48,9 +48,9 @@ impl<T: Real> Ecu<T> {
         })
     }
 
-    /// One PWM period: `exchange` takes what the ECU puts out at its start and gives what the pins brought by its end.
-    /// `elapsed_counts` is the time since the last control tick by the independent clock, read where one is due. Returns what
-    /// the control task computed, if it ran.
+    /// One PWM period: `exchange` takes the ECU's output at its start and returns the input at its end.
+    /// `elapsed_counts` is the time since the last control tick by the independent clock, read where one is due. Returns the
+    /// result of the control task, if it ran.
     pub fn period(
         &mut self,
         exchange: impl FnOnce(&Packet) -> Packet,

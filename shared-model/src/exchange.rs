@@ -1,4 +1,4 @@
-//! What passes the ECU's pins in one PWM period, as fixed-length packets: how a host stands in for servo and sensors.
+//! The signals on the ECU's pins in one PWM period, as fixed-length packets: a host takes the place of servo and sensors.
 //!
 //! At the start of each period the ECU puts out its duty, and at a control tick an actuator frame. The host moves the
 //! vehicle through that period and answers with the duty that was seen on the servo's pin and, at a control tick, a
@@ -13,9 +13,9 @@ pub const PACKET_LEN: usize = 2 + 1 + FRAME_LEN;
 /// Bytes of a packet.
 pub type PacketBytes = [u8; PACKET_LEN];
 
-/// Length of what the ECU sends, bytes: packet, cost of the PWM task, cost of the control task.
+/// Length of the ECU's message, bytes: packet, cost of the PWM task, cost of the control task.
 pub const TO_HOST_LEN: usize = PACKET_LEN + 2 + 2;
-/// Length of what the ECU receives, bytes: packet, "the run is over".
+/// Length of the message to the ECU, bytes: packet, "the run is over".
 pub const TO_ECU_LEN: usize = PACKET_LEN + 1;
 
 /// One direction of the exchange in one PWM period.
@@ -57,7 +57,7 @@ impl Packet {
     }
 }
 
-/// What the ECU sends in a PWM period.
+/// The ECU's message in a PWM period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ToHost {
     /// Duty and actuator frame.
@@ -92,7 +92,7 @@ impl ToHost {
     }
 }
 
-/// What the ECU receives in a PWM period.
+/// The message to the ECU in a PWM period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ToEcu {
     /// Captured duty and sensor frame.

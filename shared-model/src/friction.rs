@@ -1,41 +1,46 @@
-//! Dry friction of the steering: Coulomb friction on the steering rate with true stick, and the law as the paper prints
-//! it.
+//! Dry friction of the steering: Coulomb friction on the steering rate with true stick, and the law as printed in the
+//! paper.
 
 use crate::Real;
 use crate::dither::Injection;
-use crate::parameter::{Field, ParameterSet};
+use crate::listed;
+use crate::parameter::parameters;
 
 /// Standard gravity as equation (13) prints it, m/s^2.
 const GRAVITY_M_PER_S2: f64 = 9.8;
 
-/// What the friction torque depends on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum FrictionLaw {
-    /// No friction.
-    None,
-    /// Opposes the steering rate. At rest the torque takes any value up to its limit: the steering sticks as long as
-    /// that balances the other torques.
-    CoulombRate,
-    /// Sign of the steering angle, as equation (13) prints it.
-    PrintedAngle,
+listed! {
+    /// The quantity that the friction torque depends on.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+    pub enum FrictionLaw {
+        /// No friction.
+        None => "none",
+        /// Opposes the steering rate. At rest the torque takes any value up to its limit: the steering sticks as long as
+        /// that balances the other torques.
+        CoulombRate => "coulomb_rate",
+        /// Sign of the steering angle, as equation (13) prints it.
+        PrintedAngle => "printed_angle",
+    }
 }
 
-/// Parameters of the steering's dry friction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Friction<T> {
-    /// What the torque depends on.
-    pub law: FrictionLaw,
-    /// Whether the dither also acts ahead of the friction's sign function. On the steering angle it adds W; on the
-    /// steering rate it adds W times the dither's angular frequency, which all but removes the friction.
-    pub dithered: bool,
-    /// Coefficient of friction mu.
-    pub coefficient: T,
-    /// Load F_w on the front wheels, kg.
-    pub front_wheel_load_kg: T,
+parameters! {
+    section "friction";
+    /// Parameters of the steering's dry friction.
+    pub struct Friction {
+        choices {
+            /// The quantity that the torque depends on.
+            law: FrictionLaw,
+            /// Whether the dither also acts ahead of the friction's sign function. On the steering angle it adds W; on the
+            /// steering rate it adds W times the dither's angular frequency, which all but removes the friction.
+            dithered: bool,
+        }
+        /// Coefficient of friction mu.
+        coefficient: 0.0..=10.0,
+        /// Load F_w on the front wheels, kg.
+        front_wheel_load_kg: 0.0..=1e5,
+    }
 }
 
 impl<T: Real> Friction<T> {
@@ -65,62 +70,29 @@ impl<T: Real> Friction<T> {
             (true, FrictionLaw::CoulombRate) => injection.scaled(frequency_rad_per_s),
         }
     }
+}
 
-    /// The same parameters in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Friction<U> {
-        Friction {
-            law: self.law,
-            dithered: self.dithered,
-            coefficient: f(self.coefficient),
-            front_wheel_load_kg: f(self.front_wheel_load_kg),
-        }
+listed! {
+    /// State of the friction element, held over a step. The sign is that of the friction law's argument; the torque opposes
+    /// it.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum FrictionMode {
+        /// At rest, held by friction.
+        Sticking = 0,
+        /// Argument negative.
+        Negative = 1,
+        /// Argument between the two steps of a square wave's mean: no torque.
+        Neutral = 2,
+        /// Argument positive.
+        Positive = 3,
     }
-}
-
-impl<T: Real> ParameterSet<T> for Friction<T> {
-    const SECTION: &'static str = "friction";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "coefficient",
-            min: 0.0,
-            max: 10.0,
-            place: |p| &mut p.coefficient,
-        },
-        Field {
-            name: "front_wheel_load_kg",
-            min: 0.0,
-            max: 1e5,
-            place: |p| &mut p.front_wheel_load_kg,
-        },
-    ];
-}
-
-/// State of the friction element, held over a step. The sign is that of the friction law's argument; the torque opposes
-/// it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum FrictionMode {
-    /// At rest, held by friction.
-    Sticking = 0,
-    /// Argument negative.
-    Negative = 1,
-    /// Argument between the two steps of a square wave's mean: no torque.
-    Neutral = 2,
-    /// Argument positive.
-    Positive = 3,
 }
 
 impl FrictionMode {
     /// The mode with the given code, if there is one.
     pub fn from_code(code: u8) -> Option<Self> {
-        [
-            Self::Sticking,
-            Self::Negative,
-            Self::Neutral,
-            Self::Positive,
-        ]
-        .into_iter()
-        .find(|&mode| mode as u8 == code)
+        Self::ALL.into_iter().find(|&mode| mode as u8 == code)
     }
 }
 
@@ -204,8 +176,7 @@ impl<T: Real> Sign<T> {
         }
     }
 
-    /// The first step that the argument passes on its way to `argument` when it comes from `mode`, and the mode behind
-    /// it.
+    /// The first step that the argument passes on its way to `argument` when it comes from `mode`, and the mode after it.
     pub fn crossing(&self, mode: FrictionMode, argument: T) -> Option<(T, FrictionMode)> {
         use FrictionMode::{Negative, Neutral, Positive};
         let Self::Stepped { lower, upper } = *self else {

@@ -1,4 +1,4 @@
-//! Fixed-step fourth-order Runge-Kutta for the model with dry friction: what the ECU runs.
+//! Fixed-step fourth-order Runge-Kutta method for the model with dry friction, as the ECU uses it.
 //!
 //! The friction mode is held over a step, so that each step integrates a smooth right-hand side. A step in which the mode
 //! has to change is split once, where it does: where the friction law's argument passes one of its steps, or where the
@@ -14,8 +14,9 @@ use nalgebra::Vector4;
 
 /// Advances `state` by one step of `step_s` seconds, the dither's `injection` being held.
 ///
-/// Fourth order where the motion is smooth. The instant of a change of mode is found by linear interpolation over the step,
-/// which leaves a second-order error. Only the first change of mode in a step is seen; a second is made up for in the next.
+/// Fourth order where the motion is smooth. The instant of a change of mode is found by linear interpolation over the
+/// step, which leaves a second-order error. Only the first change of mode in a step is detected; a second one takes
+/// effect in the next step.
 ///
 /// Coulomb friction under the mean of a square wave so weak that the steering rate reaches W times the dither's frequency
 /// (below 2e-4 rad for the paper's) would slide along the two steps of its sign function; here it chatters between modes, in
@@ -29,7 +30,7 @@ use nalgebra::Vector4;
 /// for _ in 0..1000 {
 ///     integrate::step(&model, &mut state, 1e-3, Injection::Off);
 /// }
-/// // The yaw rate one second on; a hundredth of the step gives -0.127_526_793_270.
+/// // The yaw rate after one second; a hundredth of the step gives -0.127_526_793_270.
 /// assert!((state.x[1] + 0.127_526_793).abs() < 1e-9);
 /// ```
 pub fn step<T: Real>(model: &Model<T>, state: &mut State<T>, step_s: T, injection: Injection<T>) {
@@ -50,12 +51,12 @@ pub fn step<T: Real>(model: &Model<T>, state: &mut State<T>, step_s: T, injectio
 
 /// A change of mode within a step.
 struct Change<T> {
-    /// Share of the step that is done before it.
+    /// Share of the step before it.
     fraction: T,
     /// Value of the friction law's argument there, where it is a step of that law.
     threshold: Option<T>,
-    /// The mode behind it, unless the steering comes to rest and the torques decide.
-    behind: FrictionMode,
+    /// The mode after it, unless the steering comes to rest and the torques decide.
+    mode_after: FrictionMode,
 }
 
 /// The torque on a sticking steering reaches its limit between `start` and `end`.
@@ -65,8 +66,8 @@ fn release<T: Real>(
     end: &Vector4<T>,
     injection: Injection<T>,
 ) -> Option<Change<T>> {
-    let behind = model.mode_at_rest(end, injection);
-    let limit = match behind {
+    let mode_after = model.mode_at_rest(end, injection);
+    let limit = match mode_after {
         FrictionMode::Positive => model.friction_limit_nm(),
         FrictionMode::Negative => -model.friction_limit_nm(),
         FrictionMode::Sticking | FrictionMode::Neutral => return None,
@@ -76,7 +77,7 @@ fn release<T: Real>(
     Some(Change {
         fraction: (limit - before) / (after - before),
         threshold: None,
-        behind,
+        mode_after,
     })
 }
 
@@ -90,11 +91,11 @@ fn crossing<T: Real>(
 ) -> Option<Change<T>> {
     let argument = model.friction_argument();
     let (before, after) = (start[argument], end[argument]);
-    let (threshold, behind) = model.friction_sign(injection).crossing(mode, after)?;
+    let (threshold, mode_after) = model.friction_sign(injection).crossing(mode, after)?;
     Some(Change {
         fraction: (threshold - before) / (after - before),
         threshold: Some(threshold),
-        behind,
+        mode_after,
     })
 }
 
@@ -107,17 +108,17 @@ fn change_mode<T: Real>(
     change: &Change<T>,
 ) -> State<T> {
     let mut at = runge_kutta_4(model, start, step_s * change.fraction, injection, mode);
-    let mut behind = change.behind;
+    let mut mode_after = change.mode_after;
     if let Some(threshold) = change.threshold {
         at[model.friction_argument()] = threshold;
         if model.can_stick(injection) {
-            behind = model.mode_at_rest(&at, injection);
+            mode_after = model.mode_at_rest(&at, injection);
         }
     }
     let rest = step_s * (T::one() - change.fraction);
     State {
-        x: runge_kutta_4(model, &at, rest, injection, behind),
-        friction: behind,
+        x: runge_kutta_4(model, &at, rest, injection, mode_after),
+        friction: mode_after,
     }
 }
 
@@ -137,7 +138,7 @@ fn runge_kutta_4<T: Real>(
     let k4 = model.derivative(&(x + k3 * step_s), injection, mode);
     let mut next = x + (k1 + k2 * two + k3 * two + k4) * sixth;
     if mode == FrictionMode::Sticking {
-        // Exactly, so that nothing an arithmetic carries beside the value outlives the stick.
+        // Exactly zero, so that what an arithmetic carries beside the value (tangents) vanishes in the stick.
         next[STEERING_RATE] = T::zero();
     }
     next

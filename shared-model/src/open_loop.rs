@@ -1,16 +1,16 @@
 //! The ECU in open loop: a PWM task that dithers the servo's voltage, and a control task that steps the vehicle model on the
 //! ECU itself, without sensors. The program that firmware and host are compared on.
 //!
-//! The PWM task runs at the PWM rate, in an interrupt. It says when the control task is due: every so many samples, so
-//! that the two rates are locked to each other. Firmware runs the two at different priorities; [`OpenLoop`] runs them in turn
-//! on the host. Both give the same bits.
+//! The PWM task runs at the PWM rate, in an interrupt. It signals when the control task is due, once in a fixed number of
+//! samples, so that the two rates are locked to each other. Firmware runs the two at different priorities; [`OpenLoop`]
+//! runs them in turn on the host. Both give the same bits.
 
 use crate::dither::{Dither, Injection, Oscillator};
 use crate::servo::{Duty, Pwm};
 use crate::vehicle::{Model, State};
 use crate::{InvalidScenario, Real, Scenario, integrate};
 
-/// What the PWM task hands out each period.
+/// Output of the PWM task in a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PwmSample<T> {
     /// Duty for the period that begins.
@@ -28,9 +28,9 @@ pub struct PwmTask<T> {
     pwm: Pwm<T>,
     motor_v: T,
     dither_v: T,
-    /// Samples to go before the dither sets in.
+    /// Samples left before the dither starts.
     samples_to_dither: u32,
-    samples_a_step: u32,
+    samples_per_step: u32,
     samples_to_step: u32,
 }
 
@@ -46,7 +46,7 @@ impl<T: Real> PwmTask<T> {
         self.samples_to_step -= 1;
         let control_due = self.samples_to_step == 0;
         if control_due {
-            self.samples_to_step = self.samples_a_step;
+            self.samples_to_step = self.samples_per_step;
         }
         PwmSample {
             duty: self.pwm.duty(self.motor_v + self.dither_v * dither),
@@ -72,7 +72,7 @@ pub struct ControlTask<T> {
 }
 
 impl<T: Real> ControlTask<T> {
-    /// One model step. `dither` is the sample that the PWM holds during the step; the averaged model does not look at it.
+    /// One model step. `dither` is the sample that the PWM holds during the step; the averaged model does not use it.
     pub fn run(&mut self, dither: T) -> &State<T> {
         let injection = if self.steps_to_dither == 0 {
             self.dither.injection(dither)
@@ -84,7 +84,7 @@ impl<T: Real> ControlTask<T> {
         &self.state
     }
 
-    /// Goes on from another state: for comparing single steps, and for carrying tangents along a recorded motion.
+    /// Continues from another state: for comparing single steps, and for carrying tangents along a recorded trajectory.
     pub fn set_state(&mut self, state: State<T>) {
         self.state = state;
     }
@@ -121,16 +121,16 @@ impl<T: Real> OpenLoop<T> {
     pub fn new(scenario: &Scenario<T>) -> Result<Self, InvalidScenario> {
         scenario.validate()?;
         let run = &scenario.run;
-        let samples_a_step = scenario.samples_per_step();
+        let samples_per_step = scenario.samples_per_step();
         let steps_to_dither = scenario.dither_start_step();
         let pwm = PwmTask {
             oscillator: Oscillator::new(&scenario.dither, run.pwm_rate_hz),
             pwm: Pwm::new(&scenario.servo, run.pwm_rate_hz),
             motor_v: scenario.motor_voltage_v(),
             dither_v: scenario.dither.active_amplitude_v(),
-            samples_to_dither: steps_to_dither.saturating_mul(samples_a_step),
-            samples_a_step,
-            samples_to_step: samples_a_step,
+            samples_to_dither: steps_to_dither.saturating_mul(samples_per_step),
+            samples_per_step,
+            samples_to_step: samples_per_step,
         };
         let model = Model::new(scenario);
         let control = ControlTask {
@@ -143,7 +143,7 @@ impl<T: Real> OpenLoop<T> {
         Ok(Self { pwm, control })
     }
 
-    /// PWM periods up to and including the next model step; `on_duty` sees each duty, the return is the state behind the
+    /// PWM periods up to and including the next model step; `on_duty` receives each duty; returns the state after the
     /// step.
     pub fn step(&mut self, mut on_duty: impl FnMut(Duty)) -> &State<T> {
         loop {

@@ -1,10 +1,10 @@
-//! Parameter sets: each number's name, range and place, written once, and the checks that follow from them.
+//! Parameter sets: each number's documentation, name and range, declared once, and the checks that follow from them.
 
 use crate::Real;
 use crate::short::Short;
 use core::fmt;
 
-/// One number of a parameter set `P`: its name (which carries the unit), its allowed range, and where it is.
+/// One number of a parameter set `P`: its name (which carries the unit), its allowed range, and its accessor.
 #[derive(Debug)]
 pub struct Field<P, T> {
     /// Name as in the configuration file, with the unit at its end.
@@ -13,8 +13,8 @@ pub struct Field<P, T> {
     pub min: f64,
     /// Greatest allowed value.
     pub max: f64,
-    /// The number's place in the set.
-    pub place: fn(&mut P) -> &mut T,
+    /// Access to the number in a set.
+    pub accessor: fn(&mut P) -> &mut T,
 }
 
 /// A set of numbers that is checked, listed and set by name.
@@ -39,16 +39,22 @@ pub trait ParameterSet<T: Real>: Copy + 'static {
     fn validate_as(&self, section: &'static str) -> Result<(), OutOfRange> {
         let mut copy = *self;
         for field in Self::FIELDS {
-            check(section, field, *(field.place)(&mut copy))?;
+            check(section, field, *(field.accessor)(&mut copy))?;
         }
         Ok(())
+    }
+
+    /// Least and greatest allowed value of the number called `name`; `None` if the set has none of that name.
+    fn range(name: &str) -> Option<(f64, f64)> {
+        let field = Self::FIELDS.iter().find(|field| field.name == name)?;
+        Some((field.min, field.max))
     }
 
     /// Sets the number called `name`; `false` if the set has none of that name. The value is not checked.
     fn set(&mut self, name: &str, value: T) -> bool {
         let field = Self::FIELDS.iter().find(|field| field.name == name);
         if let Some(field) = field {
-            *(field.place)(self) = value;
+            *(field.accessor)(self) = value;
         }
         field.is_some()
     }
@@ -103,3 +109,55 @@ impl fmt::Display for OutOfRange {
 }
 
 impl core::error::Error for OutOfRange {}
+
+/// Declares a parameter set: the structure, its names in the configuration file, the ranges, and the conversion to another
+/// arithmetic. The parameters that are no numbers come first, in a block `choices`.
+macro_rules! parameters {
+    (
+        section $section:literal;
+        $(#[$about:meta])*
+        pub struct $Set:ident {
+            $(choices {
+                $($(#[$about_choice:meta])+ $choice:ident: $Kind:ty,)+
+            })?
+            $($(#[$about_number:meta])+ $number:ident: $min:literal..=$max:literal,)+
+        }
+    ) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+        pub struct $Set<T> {
+            $($($(#[$about_choice])+ pub $choice: $Kind,)+)?
+            $(
+                $(#[$about_number])+
+                #[doc = ""]
+                #[doc = concat!("Range: ", stringify!($min), " to ", stringify!($max), ".")]
+                pub $number: T,
+            )+
+        }
+
+        impl<T: $crate::Real> $Set<T> {
+            /// The same parameters in another arithmetic.
+            pub fn map<U>(&self, f: &impl Fn(T) -> U) -> $Set<U> {
+                $Set {
+                    $($($choice: self.$choice,)+)?
+                    $($number: f(self.$number),)+
+                }
+            }
+        }
+
+        impl<T: $crate::Real> $crate::parameter::ParameterSet<T> for $Set<T> {
+            const SECTION: &'static str = $section;
+            const FIELDS: &'static [$crate::parameter::Field<Self, T>] = &[
+                $($crate::parameter::Field {
+                    name: stringify!($number),
+                    min: $min,
+                    max: $max,
+                    accessor: |set| &mut set.$number,
+                },)+
+            ];
+        }
+    };
+}
+pub(crate) use parameters;

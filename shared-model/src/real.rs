@@ -1,7 +1,7 @@
-//! The arithmetic a model may use.
+//! The arithmetic of the model.
 //!
-//! The model is generic over [`Real`], so that one text of it runs in f32 on the ECU, in f64 on the host, and in any
-//! other arithmetic that a user of the crate brings (dual numbers for tangents, numbers that carry an error bound).
+//! The model is generic over [`Real`], so that one source runs in f32 on the ECU, in f64 on the host, and in any
+//! other arithmetic that implements the trait (dual numbers for tangents, numbers that carry an error bound).
 //!
 //! The transcendental functions go through `libm` on purpose. The standard library's call the platform's C library,
 //! whose last bits differ between machines; then firmware and host would not agree bit for bit.
@@ -11,7 +11,7 @@ use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssig
 
 /// A real number as the model needs it.
 ///
-/// Comparisons (`PartialOrd`) look at the value alone, also in arithmetics that carry more than a value.
+/// Comparisons (`PartialOrd`) use the value alone, also in arithmetics that carry more than a value.
 pub trait Real:
     Scalar
     + Copy

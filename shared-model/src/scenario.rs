@@ -1,25 +1,16 @@
-//! A scenario: every parameter of one run, the presets, and the check that they fit together.
+//! A scenario: every parameter of one run, and the presets.
 
 use crate::Real;
-use crate::controller::Policy;
 use crate::dither::{Application, Dither, Waveform};
 use crate::friction::{Friction, FrictionLaw};
 use crate::gate::Limits;
-use crate::parameter::{Field, OutOfRange, ParameterSet};
+use crate::listed;
+use crate::parameter::parameters;
+use crate::policy::Policy;
 use crate::servo::Servo;
-use crate::short::Short;
-use crate::stability::{MOST_STEP_TIMES_RATE, fastest_rate_per_s, least_rate_hz};
 use crate::steering::Steering;
 use crate::tire::{LOW_FRICTION_ROAD, MagicFormula, TireModel};
 use crate::vehicle::{SlipForm, Vehicle};
-use core::fmt;
-
-/// One step, less what rounding to f32 can take from it.
-const ALMOST_ONE: f64 = 1.0 - 1e-6;
-/// Most PWM samples in a model step; a telemetry record holds them all.
-pub const MAX_RATIO: u32 = 1000;
-/// Most PWM samples of a run; a counter of 32 bits holds them.
-const MAX_SAMPLES: f64 = 4e9;
 
 /// The tyres of both axles.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,81 +25,27 @@ pub struct Tires<T> {
     pub rear: MagicFormula<T>,
 }
 
-/// Speed, rates, length and start of a run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Run<T> {
-    /// Wheel speed N, rpm.
-    pub wheel_speed_rpm: T,
-    /// Length of the run, s.
-    pub duration_s: T,
-    /// Rate of the control task, Hz: the model's step rate under averaged dither.
-    pub control_rate_hz: T,
-    /// Rate of the PWM task, Hz: carrier, dither samples, and the model's step rate under the dither as a signal.
-    pub pwm_rate_hz: T,
-    /// Sideslip angle beta at the start, rad.
-    pub sideslip_rad: T,
-    /// Yaw rate gamma at the start, rad/s.
-    pub yaw_rate_rad_per_s: T,
-    /// Front steering angle delta_f at the start, rad.
-    pub steering_angle_rad: T,
-    /// Steering rate at the start, rad/s.
-    pub steering_rate_rad_per_s: T,
-}
-
-impl<T: Real> ParameterSet<T> for Run<T> {
-    const SECTION: &'static str = "run";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "wheel_speed_rpm",
-            min: 1.0,
-            max: 1e5,
-            place: |p| &mut p.wheel_speed_rpm,
-        },
-        Field {
-            name: "duration_s",
-            min: 1e-4,
-            max: 1e6,
-            place: |p| &mut p.duration_s,
-        },
-        Field {
-            name: "control_rate_hz",
-            min: 10.0,
-            max: 1e6,
-            place: |p| &mut p.control_rate_hz,
-        },
-        Field {
-            name: "pwm_rate_hz",
-            min: 10.0,
-            max: 1e6,
-            place: |p| &mut p.pwm_rate_hz,
-        },
-        Field {
-            name: "sideslip_rad",
-            min: -10.0,
-            max: 10.0,
-            place: |p| &mut p.sideslip_rad,
-        },
-        Field {
-            name: "yaw_rate_rad_per_s",
-            min: -100.0,
-            max: 100.0,
-            place: |p| &mut p.yaw_rate_rad_per_s,
-        },
-        Field {
-            name: "steering_angle_rad",
-            min: -10.0,
-            max: 10.0,
-            place: |p| &mut p.steering_angle_rad,
-        },
-        Field {
-            name: "steering_rate_rad_per_s",
-            min: -1000.0,
-            max: 1000.0,
-            place: |p| &mut p.steering_rate_rad_per_s,
-        },
-    ];
+parameters! {
+    section "run";
+    /// Speed, rates, length and start of a run.
+    pub struct Run {
+        /// Wheel speed N, rpm.
+        wheel_speed_rpm: 1.0..=1e5,
+        /// Length of the run, s.
+        duration_s: 1e-4..=1e6,
+        /// Rate of the control task, Hz: the model's step rate under averaged dither.
+        control_rate_hz: 10.0..=1e6,
+        /// Rate of the PWM task, Hz: carrier, dither samples, and the model's step rate under the dither as a signal.
+        pwm_rate_hz: 10.0..=1e6,
+        /// Sideslip angle beta at the start, rad.
+        sideslip_rad: -10.0..=10.0,
+        /// Yaw rate gamma at the start, rad/s.
+        yaw_rate_rad_per_s: -100.0..=100.0,
+        /// Front steering angle delta_f at the start, rad.
+        steering_angle_rad: -10.0..=10.0,
+        /// Steering rate at the start, rad/s.
+        steering_rate_rad_per_s: -1000.0..=1000.0,
+    }
 }
 
 /// Every parameter of one run.
@@ -136,13 +73,15 @@ pub struct Scenario<T> {
     pub run: Run<T>,
 }
 
-/// A named scenario.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Preset {
-    /// The reading of the paper that reproduces its claims: Coulomb friction on the steering rate with true stick.
-    Reconstruction,
-    /// The equations as printed: friction by the sign of the steering angle.
-    Printed,
+listed! {
+    /// A named scenario.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Preset {
+        /// The reading of the paper that reproduces its claims: Coulomb friction on the steering rate with true stick.
+        Reconstruction => "reconstruction",
+        /// The equations as printed: friction by the sign of the steering angle.
+        Printed => "printed",
+    }
 }
 
 impl<T: Real> Scenario<T> {
@@ -231,7 +170,6 @@ impl<T: Real> Scenario<T> {
 
     /// The same scenario in another arithmetic.
     pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Scenario<U> {
-        let run = &self.run;
         Scenario {
             vehicle: self.vehicle.map(f),
             tires: Tires {
@@ -245,113 +183,8 @@ impl<T: Real> Scenario<T> {
             servo: self.servo.map(f),
             policy: self.policy.map(f),
             gate: self.gate.map(f),
-            run: Run {
-                wheel_speed_rpm: f(run.wheel_speed_rpm),
-                duration_s: f(run.duration_s),
-                control_rate_hz: f(run.control_rate_hz),
-                pwm_rate_hz: f(run.pwm_rate_hz),
-                sideslip_rad: f(run.sideslip_rad),
-                yaw_rate_rad_per_s: f(run.yaw_rate_rad_per_s),
-                steering_angle_rad: f(run.steering_angle_rad),
-                steering_rate_rad_per_s: f(run.steering_rate_rad_per_s),
-            },
+            run: self.run.map(f),
         }
-    }
-
-    /// Checks every number, and that the numbers fit together.
-    ///
-    /// # Errors
-    /// The first fault found.
-    ///
-    /// ```
-    /// let mut scenario = shared_model::Scenario::reconstruction();
-    /// scenario.vehicle.mass_kg = -1500.0_f64;
-    /// assert_eq!(
-    ///     scenario.validate().unwrap_err().to_string(),
-    ///     "vehicle.mass_kg = -1500: must be a finite number from 1 to 100000"
-    /// );
-    /// ```
-    pub fn validate(&self) -> Result<(), InvalidScenario> {
-        self.vehicle.validate()?;
-        self.tires.front.validate_as("tires.front")?;
-        self.tires.rear.validate_as("tires.rear")?;
-        self.steering.validate()?;
-        self.friction.validate()?;
-        self.dither.validate()?;
-        self.servo.validate()?;
-        self.policy.validate()?;
-        self.gate.validate()?;
-        self.run.validate()?;
-        self.validate_rates()?;
-        self.validate_frequency()?;
-        self.validate_voltage()?;
-        self.validate_step()
-    }
-
-    /// The fixed step must be stable, or its motion is not the model's.
-    fn validate_step(&self) -> Result<(), InvalidScenario> {
-        let rate_hz = self.model_rate_hz().to_f64();
-        let fastest_rate_per_s = fastest_rate_per_s(self);
-        if fastest_rate_per_s <= MOST_STEP_TIMES_RATE * rate_hz {
-            return Ok(());
-        }
-        Err(InvalidScenario::StepTooLong {
-            field: match self.dither.application {
-                Application::Averaged => "run.control_rate_hz",
-                Application::Signal => "run.pwm_rate_hz",
-            },
-            rate_hz,
-            fastest_rate_per_s,
-        })
-    }
-
-    fn validate_frequency(&self) -> Result<(), InvalidScenario> {
-        let frequency_rad_per_s = self.dither.frequency_rad_per_s().to_f64();
-        let max_rad_per_s = core::f64::consts::PI * self.run.pwm_rate_hz.to_f64();
-        if frequency_rad_per_s <= max_rad_per_s {
-            return Ok(());
-        }
-        Err(InvalidScenario::DitherFrequency {
-            frequency_rad_per_s,
-            max_rad_per_s,
-        })
-    }
-
-    fn validate_rates(&self) -> Result<(), InvalidScenario> {
-        let run = &self.run;
-        let (control_hz, pwm_hz) = (run.control_rate_hz.to_f64(), run.pwm_rate_hz.to_f64());
-        let (control, pwm) = (run.control_rate_hz.to_u32(), run.pwm_rate_hz.to_u32());
-        let whole = f64::from(control) == control_hz && f64::from(pwm) == pwm_hz;
-        if !whole || control == 0 || !pwm.is_multiple_of(control) || pwm / control > MAX_RATIO {
-            return Err(InvalidScenario::Rates { control_hz, pwm_hz });
-        }
-        let counts = self.servo.period_counts(run.pwm_rate_hz);
-        if !(2..=u32::from(u16::MAX)).contains(&counts) {
-            return Err(InvalidScenario::TimerPeriod { counts });
-        }
-        let samples = run.duration_s.to_f64() * pwm_hz;
-        let steps = run.duration_s.to_f64() * self.model_rate_hz().to_f64();
-        if steps < ALMOST_ONE || samples > MAX_SAMPLES {
-            return Err(InvalidScenario::Duration {
-                duration_s: run.duration_s.to_f64(),
-                min_s: 1.0 / self.model_rate_hz().to_f64(),
-                max_s: MAX_SAMPLES / pwm_hz,
-            });
-        }
-        Ok(())
-    }
-
-    fn validate_voltage(&self) -> Result<(), InvalidScenario> {
-        let dither_v = self.dither.active_amplitude_v();
-        let motor_v = self.motor_voltage_v();
-        if motor_v.abs() + dither_v <= self.servo.bus_voltage_v {
-            return Ok(());
-        }
-        Err(InvalidScenario::OverVoltage {
-            motor_v: motor_v.to_f64(),
-            dither_v: dither_v.to_f64(),
-            bus_v: self.servo.bus_voltage_v.to_f64(),
-        })
     }
 
     /// Voltage that drives the motor current through the winding, V.
@@ -401,139 +234,3 @@ impl<T: Real> Scenario<T> {
             .max(1)
     }
 }
-
-/// Why a scenario cannot be run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum InvalidScenario {
-    /// A number is not finite or not in its range.
-    OutOfRange(OutOfRange),
-    /// The rates are not whole numbers, or the PWM rate is no multiple of the control rate.
-    Rates {
-        /// Control rate, Hz.
-        control_hz: f64,
-        /// PWM rate, Hz.
-        pwm_hz: f64,
-    },
-    /// The carrier period does not fit the timer.
-    TimerPeriod {
-        /// Period asked for, counts.
-        counts: u32,
-    },
-    /// The run is shorter than one step or longer than the counters.
-    Duration {
-        /// Length asked for, s.
-        duration_s: f64,
-        /// Least length, s.
-        min_s: f64,
-        /// Greatest length, s.
-        max_s: f64,
-    },
-    /// The dither is faster than half the PWM rate, so its samples would show another frequency.
-    DitherFrequency {
-        /// Frequency asked for, rad/s.
-        frequency_rad_per_s: f64,
-        /// Greatest frequency at the PWM rate, rad/s.
-        max_rad_per_s: f64,
-    },
-    /// Motor and dither together ask for more than the bus has.
-    OverVoltage {
-        /// Voltage of the motor current, V.
-        motor_v: f64,
-        /// Dither amplitude, V.
-        dither_v: f64,
-        /// Bus voltage, V.
-        bus_v: f64,
-    },
-    /// The fixed step is too long for the model's fastest rate: its solution would grow where the motion decays.
-    StepTooLong {
-        /// Name of the rate that the model is stepped at.
-        field: &'static str,
-        /// That rate, Hz.
-        rate_hz: f64,
-        /// Fastest rate of the linearised model, 1/s.
-        fastest_rate_per_s: f64,
-    },
-}
-
-impl InvalidScenario {
-    /// Voltage that the motor leaves for the dither, V.
-    pub fn left_for_dither_v(motor_v: f64, bus_v: f64) -> f64 {
-        (bus_v - motor_v.abs()).max(0.0)
-    }
-}
-
-impl From<OutOfRange> for InvalidScenario {
-    fn from(error: OutOfRange) -> Self {
-        Self::OutOfRange(error)
-    }
-}
-
-impl fmt::Display for InvalidScenario {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::OutOfRange(ref error) => error.fmt(f),
-            Self::Rates { control_hz, pwm_hz } => write!(
-                f,
-                "run.pwm_rate_hz = {} and run.control_rate_hz = {}: both must be whole numbers, the first a multiple of the \
-                 second, at most {MAX_RATIO} times it",
-                Short(pwm_hz),
-                Short(control_hz)
-            ),
-            Self::TimerPeriod { counts } => write!(
-                f,
-                "servo.timer_clock_hz over run.pwm_rate_hz is {counts} counts: must be from 2 to {}",
-                u16::MAX
-            ),
-            Self::Duration {
-                duration_s,
-                min_s,
-                max_s,
-            } => write!(
-                f,
-                "run.duration_s = {}: must be from {} (one step) to {}",
-                Short(duration_s),
-                Short(min_s),
-                Short(max_s)
-            ),
-            Self::DitherFrequency {
-                frequency_rad_per_s,
-                max_rad_per_s,
-            } => write!(
-                f,
-                "dither frequency {} rad/s: must be at most {} rad/s, half of run.pwm_rate_hz",
-                Short(frequency_rad_per_s),
-                Short(max_rad_per_s)
-            ),
-            Self::OverVoltage {
-                motor_v,
-                dither_v,
-                bus_v,
-            } => write!(
-                f,
-                "dither.amplitude_v = {}: with {} V for the motor current it exceeds servo.bus_voltage_v = {}; at most {} V \
-                 are left for the dither",
-                Short(dither_v),
-                Short(motor_v),
-                Short(bus_v),
-                Short(Self::left_for_dither_v(motor_v, bus_v))
-            ),
-            Self::StepTooLong {
-                field,
-                rate_hz,
-                fastest_rate_per_s,
-            } => {
-                let least_hz = least_rate_hz(fastest_rate_per_s);
-                write!(
-                    f,
-                    "{field} = {rate_hz}: the step is too long; {} s times the model's fastest rate, {fastest_rate_per_s:.0} 1/s, \
-                     is {:.2}, and must be at most {MOST_STEP_TIMES_RATE}: at least {least_hz} Hz, a step of {:.2e} s",
-                    1.0 / rate_hz,
-                    fastest_rate_per_s / rate_hz,
-                    1.0 / least_hz
-                )
-            }
-        }
-    }
-}
-
-impl core::error::Error for InvalidScenario {}

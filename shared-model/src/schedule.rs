@@ -1,12 +1,11 @@
-//! The dither's schedule: which amplitude suppresses the chaos at which wheel speed.
+//! The dither's schedule: the amplitude that suppresses the chaos, by wheel speed.
 //!
 //! The ECU carries one for each waveform, [`crate::schedule_table`], made by `sim-host schedule`.
 
 use crate::Real;
-use crate::dither::Waveform;
-use crate::schedule_table::{POINTS, SINE, SQUARE};
 
-/// Amplitudes of one waveform at equally spaced wheel speeds. Small and `Copy`: each channel of the ECU holds its own in RAM.
+/// Amplitudes of one waveform at equally spaced wheel speeds. Small and `Copy`: each channel of the ECU holds its own in
+/// RAM.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule<T, const POINTS: usize> {
     /// First wheel speed, rpm. Below it the dither is off.
@@ -15,24 +14,6 @@ pub struct Schedule<T, const POINTS: usize> {
     pub step_rpm: T,
     /// Amplitude W at each wheel speed, V; 0 where the motion needs no dither.
     pub amplitudes_v: [T; POINTS],
-}
-
-/// A schedule of the size that the ECU carries.
-pub type Table<T> = Schedule<T, POINTS>;
-
-impl<T: Real> Table<T> {
-    /// The ECU's schedule for a waveform; without one all amplitudes are 0.
-    pub fn of(waveform: Waveform) -> Self {
-        let table = match waveform {
-            Waveform::None => Schedule {
-                amplitudes_v: [0.0; POINTS],
-                ..SQUARE
-            },
-            Waveform::Square => SQUARE,
-            Waveform::Sine => SINE,
-        };
-        table.map(&|value| T::from_f64(value.into()))
-    }
 }
 
 impl<T: Real, const POINTS: usize> Schedule<T, POINTS> {
@@ -72,13 +53,13 @@ impl<T: Real, const POINTS: usize> Schedule<T, POINTS> {
 
 /// Amplitude for a wheel speed, V, from amplitudes at equally spaced wheel speeds: the larger of its two neighbours'.
 ///
-/// Not interpolated: between a speed that needs no dither and one that does, a part of the least amplitude would be no
-/// suppression at all, and weak dither can turn period one into chaos. In steps, only amplitudes are used that were found
-/// good at the speeds on both sides.
+/// Not interpolated: between a speed that needs no dither and one that does, a fraction of the least amplitude would not
+/// suppress the chaos, and weak dither can turn period one into chaos. In steps, only amplitudes are used that suppress
+/// it at the speeds on both sides.
 ///
-/// Below the first speed 0: the motion is at rest or of period one. Above the last the last amplitude, as dither that is
-/// turned off just where the chaos is worst would be the greater harm; how fast the vehicle may go is not decided here.
-/// A speed that is NaN or infinite gives 0. Amplitudes are handed out unchecked.
+/// Below the first speed 0: the motion is at rest or of period one. Above the last the last amplitude, as switching the
+/// dither off where the chaos is worst would be more harmful; the greatest speed of the vehicle is not decided here.
+/// A speed that is NaN or infinite gives 0. Amplitudes are returned unchecked.
 pub fn amplitude_v<T: Real>(
     first_rpm: T,
     step_rpm: T,

@@ -1,6 +1,6 @@
 //! Packets on a serial line: COBS with a zero byte at the end, and a CRC-16 inside.
 //!
-//! A reader that comes in the middle, or loses bytes, is right again at the next zero.
+//! A reader that starts in the middle, or loses bytes, is synchronised again at the next zero.
 
 const CHECKSUM: crc::Crc<u16> = crc::Crc::<u16>::new(&crc::CRC_16_IBM_3740);
 const CHECKSUM_LEN: usize = 2;
@@ -38,7 +38,7 @@ pub fn frame(body: &[u8], mut send: impl FnMut(u8)) {
     send(0);
 }
 
-/// What a byte completed.
+/// Result of a byte.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Received<'a> {
     /// No packet yet.
@@ -83,7 +83,7 @@ impl Deframer {
 }
 
 fn unpack<'a>(framed: &[u8], plain: &'a mut [u8; FRAMED_MAX]) -> Option<&'a [u8]> {
-    // The crate's decoder of whole slices can panic as far as the compiler sees, the one of single bytes cannot.
+    // The compiler cannot exclude a panic of the crate's decoder of slices; it can for the decoder of single bytes.
     let mut decoder = cobs::CobsDecoder::new(plain);
     let mut length = None;
     for &byte in framed.iter().chain(&[0]) {

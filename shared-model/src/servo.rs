@@ -4,20 +4,20 @@
 //! the duty in whole steps of its period.
 
 use crate::Real;
-use crate::parameter::{Field, ParameterSet};
+use crate::parameter::parameters;
 use core::fmt;
 
-/// Parameters of the servo drive. The paper has none; these are assumed.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Servo<T> {
-    /// Bus voltage, V.
-    pub bus_voltage_v: T,
-    /// Resistance of the motor's winding, ohm: turns the motor current into the voltage that drives it at rest.
-    pub winding_resistance_ohm: T,
-    /// Clock of the PWM timer, Hz. The carrier period is this over the PWM rate, in whole counts.
-    pub timer_clock_hz: T,
+parameters! {
+    section "servo";
+    /// Parameters of the servo drive. The paper has none; these are assumed.
+    pub struct Servo {
+        /// Bus voltage, V.
+        bus_voltage_v: 0.1..=1000.0,
+        /// Resistance of the motor's winding, ohm: turns the motor current into the voltage that drives it at rest.
+        winding_resistance_ohm: 0.0..=100.0,
+        /// Clock of the PWM timer, Hz. The carrier period is this over the PWM rate, in whole counts.
+        timer_clock_hz: 1e3..=1e9,
+    }
 }
 
 impl<T: Real> Servo<T> {
@@ -25,39 +25,6 @@ impl<T: Real> Servo<T> {
     pub fn period_counts(&self, pwm_rate_hz: T) -> u32 {
         (self.timer_clock_hz / pwm_rate_hz + T::from_f64(0.5)).to_u32()
     }
-
-    /// The same parameters in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Servo<U> {
-        Servo {
-            bus_voltage_v: f(self.bus_voltage_v),
-            winding_resistance_ohm: f(self.winding_resistance_ohm),
-            timer_clock_hz: f(self.timer_clock_hz),
-        }
-    }
-}
-
-impl<T: Real> ParameterSet<T> for Servo<T> {
-    const SECTION: &'static str = "servo";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "bus_voltage_v",
-            min: 0.1,
-            max: 1000.0,
-            place: |p| &mut p.bus_voltage_v,
-        },
-        Field {
-            name: "winding_resistance_ohm",
-            min: 0.0,
-            max: 100.0,
-            place: |p| &mut p.winding_resistance_ohm,
-        },
-        Field {
-            name: "timer_clock_hz",
-            min: 1e3,
-            max: 1e9,
-            place: |p| &mut p.timer_clock_hz,
-        },
-    ];
 }
 
 /// Duty cycle as the timer has it: `code` counts high out of `period`. The code is never above the period.
@@ -172,7 +139,7 @@ impl<T: Real> Pwm<T> {
         let code = if counts >= top {
             self.period
         } else if counts >= T::zero() {
-            // Below the period, so it fits; the least of the two all the same, for a proof that needs no reasoning.
+            // Below the period, so it fits; the minimum makes that evident to the compiler.
             let rounded = (counts + T::from_f64(0.5)).to_u32();
             rounded.min(self.period.into()) as u16
         } else if counts < T::zero() {

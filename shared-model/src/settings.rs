@@ -1,72 +1,63 @@
-//! Scenarios as text, one `section.name=value` a setting: how a scenario reaches the ECU without a rebuild.
+//! Scenarios as text, one setting `section.name=value` per word: they reach the ECU without a rebuild.
 
 use crate::Real;
-use crate::dither::{Application, Waveform};
-use crate::friction::FrictionLaw;
+use crate::dither::{Application, Dither, Waveform};
+use crate::friction::{Friction, FrictionLaw};
+use crate::gate::Limits;
 use crate::parameter::ParameterSet;
-use crate::scenario::{Preset, Scenario};
-use crate::tire::TireModel;
-use crate::vehicle::SlipForm;
+use crate::policy::Policy;
+use crate::scenario::{Preset, Run, Scenario};
+use crate::servo::Servo;
+use crate::steering::Steering;
+use crate::tire::{MagicFormula, TireModel};
+use crate::vehicle::{SlipForm, Vehicle};
 use core::fmt;
 use core::str::FromStr;
 
 /// A parameter that is one of a few names.
 pub trait Choice: Copy + PartialEq + 'static {
-    /// All choices with their names, as in the configuration file.
-    const ALL: &'static [(&'static str, Self)];
+    /// All choices.
+    const ALL: &'static [Self];
+
+    /// Its name, as in the configuration file.
+    fn name(self) -> &'static str;
 
     /// The choice of that name.
     fn from_name(name: &str) -> Option<Self> {
-        let named = Self::ALL.iter().find(|(known, _)| *known == name);
-        named.map(|&(_, choice)| choice)
+        let named = Self::ALL.iter().find(|choice| choice.name() == name);
+        named.copied()
     }
 }
 
-impl Choice for Preset {
-    const ALL: &'static [(&'static str, Self)] = &[
-        ("reconstruction", Self::Reconstruction),
-        ("printed", Self::Printed),
-    ];
-}
+macro_rules! choices {
+    ($($Enum:ident),+) => {$(
+        impl Choice for $Enum {
+            const ALL: &'static [Self] = &$Enum::ALL;
 
-impl Choice for SlipForm {
-    const ALL: &'static [(&'static str, Self)] =
-        &[("small_angle", Self::SmallAngle), ("exact", Self::Exact)];
+            fn name(self) -> &'static str {
+                self.name()
+            }
+        }
+    )+};
 }
-
-impl Choice for TireModel {
-    const ALL: &'static [(&'static str, Self)] = &[
-        ("cubic", Self::Cubic),
-        ("magic_formula", Self::MagicFormula),
-    ];
-}
-
-impl Choice for FrictionLaw {
-    const ALL: &'static [(&'static str, Self)] = &[
-        ("none", Self::None),
-        ("coulomb_rate", Self::CoulombRate),
-        ("printed_angle", Self::PrintedAngle),
-    ];
-}
-
-impl Choice for Waveform {
-    const ALL: &'static [(&'static str, Self)] = &[
-        ("none", Self::None),
-        ("square", Self::Square),
-        ("sine", Self::Sine),
-    ];
-}
-
-impl Choice for Application {
-    const ALL: &'static [(&'static str, Self)] =
-        &[("averaged", Self::Averaged), ("signal", Self::Signal)];
-}
+choices!(
+    Preset,
+    SlipForm,
+    TireModel,
+    FrictionLaw,
+    Waveform,
+    Application
+);
 
 impl Choice for bool {
-    const ALL: &'static [(&'static str, Self)] = &[("true", true), ("false", false)];
+    const ALL: &'static [Self] = &[true, false];
+
+    fn name(self) -> &'static str {
+        if self { "true" } else { "false" }
+    }
 }
 
-/// Why a setting was not taken.
+/// Reason why a setting was refused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SettingError {
     /// Not of the form `key=value`.
@@ -80,7 +71,7 @@ pub enum SettingError {
 }
 
 impl SettingError {
-    /// What is wrong, in words.
+    /// The reason in words.
     pub fn reason(self) -> &'static str {
         match self {
             Self::NoEqualsSign => "must be key=value",
@@ -98,6 +89,31 @@ impl fmt::Display for SettingError {
 }
 
 impl core::error::Error for SettingError {}
+
+impl<T: Real> Scenario<T> {
+    /// Least and greatest allowed value of the number `section.name`; `None` if there is none of that name.
+    ///
+    /// ```
+    /// use shared_model::Scenario;
+    /// assert_eq!(Scenario::<f64>::range("vehicle.mass_kg"), Some((1.0, 1e5)));
+    /// assert_eq!(Scenario::<f64>::range("vehicle.slip_form"), None);
+    /// ```
+    pub fn range(key: &str) -> Option<(f64, f64)> {
+        let (section, name) = key.rsplit_once('.')?;
+        match section {
+            "vehicle" => Vehicle::<T>::range(name),
+            "tires.front" | "tires.rear" => MagicFormula::<T>::range(name),
+            "steering" => Steering::<T>::range(name),
+            "friction" => Friction::<T>::range(name),
+            "dither" => Dither::<T>::range(name),
+            "servo" => Servo::<T>::range(name),
+            "policy" => Policy::<T>::range(name),
+            "gate" => Limits::<T>::range(name),
+            "run" => Run::<T>::range(name),
+            _ => None,
+        }
+    }
+}
 
 impl<T: Real + FromStr> Scenario<T> {
     /// Takes one setting: `preset=NAME`, which replaces everything before it, or `section.name=value`. The value's range is
@@ -131,7 +147,7 @@ impl<T: Real + FromStr> Scenario<T> {
     fn set_number(&mut self, key: &str, value: &str) -> Result<(), SettingError> {
         let (section, name) = key.rsplit_once('.').ok_or(SettingError::UnknownKey)?;
         let parsed = value.parse();
-        // The key is looked at first: a misspelt choice, whose value is no number, is an unknown key all the same.
+        // The key is checked first: a misspelt choice, whose value is no number, is reported as an unknown key.
         let mut changed = *self;
         let number = parsed.as_ref().map_or(T::zero(), |&number| number);
         let known = match section {

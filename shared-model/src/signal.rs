@@ -1,8 +1,9 @@
-//! What passes between vehicle and ECU: measurements in, the actuation's state out.
+//! Signals between vehicle and ECU: measurements in, the actuation's state out.
 
 use crate::Real;
+use crate::listed;
 
-/// What the sensors tell, once a control tick.
+/// Measurements of the sensors, once per control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement<T> {
     /// Wheel speed N, rpm.
@@ -13,7 +14,7 @@ pub struct Measurement<T> {
     pub steering_angle_rad: T,
     /// Steering rate, rad/s.
     pub steering_rate_rad_per_s: T,
-    /// Motor current that the driver asks for, A.
+    /// Motor current that the driver requests, A.
     pub current_request_a: T,
 }
 
@@ -30,31 +31,31 @@ impl<T: Real> Measurement<T> {
     }
 }
 
-/// What the ECU is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Mode {
-    /// No valid sensor frame yet; the servo is neutral.
-    Starting = 0,
-    /// Following the driver's request, with dither where the policy has it.
-    Active = 1,
-    /// A fault was found: dither ramped out, servo neutral, until restart.
-    Safe = 2,
+listed! {
+    /// Operating mode of the ECU.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum Mode {
+        /// No valid sensor frame yet; the servo is neutral.
+        Starting = 0,
+        /// Following the driver's request, with dither where the policy has it.
+        Active = 1,
+        /// A fault was found: dither ramped out, servo neutral, until restart.
+        Safe = 2,
+    }
 }
 
 impl Mode {
     /// The mode of that number in a frame.
     pub fn from_code(code: u8) -> Option<Self> {
-        [Self::Starting, Self::Active, Self::Safe]
-            .into_iter()
-            .find(|mode| *mode as u8 == code)
+        Self::ALL.into_iter().find(|mode| *mode as u8 == code)
     }
 }
 
-/// What the ECU tells the vehicle, once a control tick.
+/// The ECU's report to the vehicle, once per control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Actuation<T> {
-    /// What the ECU is doing.
+    /// Operating mode of the ECU.
     pub mode: Mode,
     /// Faults that put the ECU into its safe state, one bit each; see `gate::Fault`.
     pub faults: u32,

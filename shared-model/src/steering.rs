@@ -1,29 +1,29 @@
 //! Steering actuator: motor, gear and front wheels about the steering axis.
 
 use crate::Real;
-use crate::parameter::{Field, ParameterSet};
+use crate::parameter::parameters;
 
-/// Parameters of the steering system, Table 2.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Steering<T> {
-    /// Total moment of inertia J_w, kg m^2 (the paper writes N m s^2/rad).
-    pub inertia_kg_m2: T,
-    /// Viscous damping b_w, N m s/rad.
-    pub damping_nm_s_per_rad: T,
-    /// Steering ratio r_s.
-    pub ratio: T,
-    /// Motor constant k_M, N m/A.
-    pub motor_constant_nm_per_a: T,
-    /// Motor current i_M, A.
-    pub motor_current_a: T,
-    /// Efficiency eta of the gear.
-    pub efficiency: T,
-    /// Pneumatic trail t_p, m.
-    pub pneumatic_trail_m: T,
-    /// Mechanical trail t_m, m.
-    pub mechanical_trail_m: T,
+parameters! {
+    section "steering";
+    /// Parameters of the steering system, Table 2.
+    pub struct Steering {
+        /// Total moment of inertia J_w, kg m^2 (the paper writes N m s^2/rad).
+        inertia_kg_m2: 1e-3..=1e5,
+        /// Viscous damping b_w, N m s/rad.
+        damping_nm_s_per_rad: 0.0..=1e6,
+        /// Steering ratio r_s.
+        ratio: 0.1..=1000.0,
+        /// Motor constant k_M, N m/A.
+        motor_constant_nm_per_a: 0.0..=100.0,
+        /// Motor current i_M, A.
+        motor_current_a: -1000.0..=1000.0,
+        /// Efficiency eta of the gear.
+        efficiency: 0.0..=1.0,
+        /// Pneumatic trail t_p, m.
+        pneumatic_trail_m: 0.0..=1.0,
+        /// Mechanical trail t_m, m.
+        mechanical_trail_m: 0.0..=1.0,
+    }
 }
 
 impl<T: Real> Steering<T> {
@@ -41,72 +41,4 @@ impl<T: Real> Steering<T> {
     pub fn trail_m(&self) -> T {
         self.pneumatic_trail_m + self.mechanical_trail_m
     }
-
-    /// The same parameters in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Steering<U> {
-        Steering {
-            inertia_kg_m2: f(self.inertia_kg_m2),
-            damping_nm_s_per_rad: f(self.damping_nm_s_per_rad),
-            ratio: f(self.ratio),
-            motor_constant_nm_per_a: f(self.motor_constant_nm_per_a),
-            motor_current_a: f(self.motor_current_a),
-            efficiency: f(self.efficiency),
-            pneumatic_trail_m: f(self.pneumatic_trail_m),
-            mechanical_trail_m: f(self.mechanical_trail_m),
-        }
-    }
-}
-
-impl<T: Real> ParameterSet<T> for Steering<T> {
-    const SECTION: &'static str = "steering";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "inertia_kg_m2",
-            min: 1e-3,
-            max: 1e5,
-            place: |p| &mut p.inertia_kg_m2,
-        },
-        Field {
-            name: "damping_nm_s_per_rad",
-            min: 0.0,
-            max: 1e6,
-            place: |p| &mut p.damping_nm_s_per_rad,
-        },
-        Field {
-            name: "ratio",
-            min: 0.1,
-            max: 1000.0,
-            place: |p| &mut p.ratio,
-        },
-        Field {
-            name: "motor_constant_nm_per_a",
-            min: 0.0,
-            max: 100.0,
-            place: |p| &mut p.motor_constant_nm_per_a,
-        },
-        Field {
-            name: "motor_current_a",
-            min: -1000.0,
-            max: 1000.0,
-            place: |p| &mut p.motor_current_a,
-        },
-        Field {
-            name: "efficiency",
-            min: 0.0,
-            max: 1.0,
-            place: |p| &mut p.efficiency,
-        },
-        Field {
-            name: "pneumatic_trail_m",
-            min: 0.0,
-            max: 1.0,
-            place: |p| &mut p.pneumatic_trail_m,
-        },
-        Field {
-            name: "mechanical_trail_m",
-            min: 0.0,
-            max: 1.0,
-            place: |p| &mut p.mechanical_trail_m,
-        },
-    ];
 }

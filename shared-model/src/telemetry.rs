@@ -1,6 +1,6 @@
-//! Bulk telemetry: what the ECU tells about a run, bit by bit.
+//! Bulk telemetry: the ECU's record of a run, to the bit.
 //!
-//! A stream is one header, one record a model step, and one trailer. Each is a tag byte, a body in little-endian order and
+//! A stream is one header, one record per model step, and one trailer. Each is a tag byte, a body in little-endian order and
 //! a CRC-16, so that a flipped bit is found where it is and a stream that was cut short lacks its trailer. The numbers of
 //! the state are their bits: nothing is rounded on the way.
 
@@ -31,18 +31,18 @@ pub const fn record_len(samples_per_step: u16) -> usize {
     RECORD_FIXED_LEN + 2 * samples_per_step as usize
 }
 
-/// First frame of a stream: what the records mean.
+/// First frame of a stream: the meaning of the records.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Header {
     /// PWM samples, and so duty codes, in a record.
     pub samples_per_step: u16,
-    /// Model steps a second.
+    /// Model steps per second.
     pub step_rate_hz: u32,
     /// Counts of the PWM timer's period.
     pub pwm_period: u16,
-    /// Counts a second of the clock that measures the tasks.
+    /// Counts per second of the clock that measures the tasks.
     pub cost_clock_hz: u32,
-    /// Instructions a second that the core is simulated to execute; 0 where it is not.
+    /// Instructions per second of a simulated core; 0 on silicon.
     pub instruction_rate_hz: u32,
     /// State in which the run starts.
     pub initial: State<f32>,
@@ -53,7 +53,7 @@ pub struct Header {
 pub struct Record {
     /// Number of the step, from 1; the state is that at `index` steps after the start.
     pub index: u32,
-    /// State behind the step.
+    /// State after the step.
     pub state: State<f32>,
     /// Counts of the cost clock that the control task took.
     pub control_cost: u16,
@@ -61,7 +61,7 @@ pub struct Record {
     pub pwm_cost: u16,
 }
 
-/// Last frame of a stream: how the run ended.
+/// Last frame of a stream: the end of the run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Trailer {
     /// Exit code of the firmware.
@@ -76,14 +76,14 @@ pub struct Trailer {
     pub final_duty: u16,
     /// Duty code of no voltage.
     pub neutral_duty: u16,
-    /// Least and most counts of the cost clock from one PWM interrupt to the next, saturated; the least is above the most
-    /// where there were no two.
-    pub least_spacing: u16,
-    /// See there.
-    pub most_spacing: u16,
+    /// Shortest interval from one PWM interrupt to the next, counts of the cost clock, saturated; above the longest where
+    /// there is none.
+    pub min_interval: u16,
+    /// Longest interval from one PWM interrupt to the next, counts of the cost clock, saturated.
+    pub max_interval: u16,
 }
 
-/// Why a frame cannot be read.
+/// Reason why a frame cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameError {
     /// Fewer bytes than the frame has.
@@ -95,7 +95,7 @@ pub enum FrameError {
     },
     /// The tag is not the expected one.
     UnknownTag(u8),
-    /// The checksum does not fit the bytes.
+    /// The checksum does not match the bytes.
     Checksum {
         /// Checksum of the bytes.
         computed: u16,
@@ -117,7 +117,7 @@ pub enum FrameError {
         /// Greatest value.
         max: u32,
     },
-    /// The run starts at what is no number.
+    /// The initial state has a number that is not finite.
     InitialState,
 }
 
@@ -294,7 +294,7 @@ impl Header {
         Ok(header)
     }
 
-    /// Checks what a header from outside says: a right check sum does not make it that of a run.
+    /// Checks the values of a header from outside: a valid checksum does not make them plausible.
     fn validate(&self) -> Result<(), FrameError> {
         let samples = u32::from(self.samples_per_step);
         let period = u32::from(self.pwm_period);
@@ -348,7 +348,7 @@ impl Record {
         writer.finish()
     }
 
-    /// Reads the frame at the start of `bytes`; `on_duty` sees its duty codes.
+    /// Reads the frame at the start of `bytes`; `on_duty` receives its duty codes.
     ///
     /// # Errors
     /// If it is cut short or damaged, or is no record.
@@ -381,8 +381,8 @@ impl Trailer {
         writer.u32(self.stack_bytes);
         writer.u16(self.final_duty);
         writer.u16(self.neutral_duty);
-        writer.u16(self.least_spacing);
-        writer.u16(self.most_spacing);
+        writer.u16(self.min_interval);
+        writer.u16(self.max_interval);
         writer.finish()
     }
 
@@ -399,8 +399,8 @@ impl Trailer {
             stack_bytes: reader.u32(),
             final_duty: reader.u16(),
             neutral_duty: reader.u16(),
-            least_spacing: reader.u16(),
-            most_spacing: reader.u16(),
+            min_interval: reader.u16(),
+            max_interval: reader.u16(),
         })
     }
 }

@@ -4,21 +4,22 @@
 
 use crate::Real;
 use crate::dither::{Injection, SineMean};
-use crate::parameter::{Field, ParameterSet};
+use crate::listed;
+use crate::parameter::parameters;
 
-/// The Magic Formula's coefficients for one axle, equations (6) and (7).
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct MagicFormula<T> {
-    /// Stiffness factor B, 1/rad.
-    pub stiffness_per_rad: T,
-    /// Shape factor C.
-    pub shape: T,
-    /// Peak force D, N.
-    pub peak_n: T,
-    /// Curvature factor E.
-    pub curvature: T,
+parameters! {
+    section "tire";
+    /// The Magic Formula's coefficients for one axle, equations (6) and (7).
+    pub struct MagicFormula {
+        /// Stiffness factor B, 1/rad.
+        stiffness_per_rad: 0.1..=100.0,
+        /// Shape factor C.
+        shape: 0.1..=10.0,
+        /// Peak force D, N. Negative is the usual vehicle sign, with which the motion diverges here.
+        peak_n: -1e6..=1e6,
+        /// Curvature factor E.
+        curvature: -100.0..=1.0,
+    }
 }
 
 impl<T: Real> MagicFormula<T> {
@@ -67,16 +68,6 @@ impl<T: Real> MagicFormula<T> {
                 T::from_f64(0.5) * (self.force(alpha + amplitude) + self.force(alpha - amplitude))
             }
             Injection::SineMean { amplitude } => mean.of(|a| self.force(a), alpha, amplitude),
-        }
-    }
-
-    /// The same coefficients in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> MagicFormula<U> {
-        MagicFormula {
-            stiffness_per_rad: f(self.stiffness_per_rad),
-            shape: f(self.shape),
-            peak_n: f(self.peak_n),
-            curvature: f(self.curvature),
         }
     }
 }
@@ -188,15 +179,17 @@ impl<T: Real> CubicTire<T> {
     }
 }
 
-/// Which tyre the model uses.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum TireModel {
-    /// Equations (8) and (9).
-    Cubic,
-    /// Equations (6) and (7).
-    MagicFormula,
+listed! {
+    /// Which tyre the model uses.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+    pub enum TireModel {
+        /// Equations (8) and (9).
+        Cubic => "cubic",
+        /// Equations (6) and (7).
+        MagicFormula => "magic_formula",
+    }
 }
 
 /// Front or rear axle's tyres, ready to be evaluated.
@@ -234,35 +227,4 @@ impl<T: Real> Tire<T> {
             Self::MagicFormula(tire, mean) => tire.dithered_force(mean, alpha, injection),
         }
     }
-}
-
-impl<T: Real> ParameterSet<T> for MagicFormula<T> {
-    const SECTION: &'static str = "tire";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "stiffness_per_rad",
-            min: 0.1,
-            max: 100.0,
-            place: |p| &mut p.stiffness_per_rad,
-        },
-        Field {
-            name: "shape",
-            min: 0.1,
-            max: 10.0,
-            place: |p| &mut p.shape,
-        },
-        // Negative: the usual vehicle sign, which diverges here but may be asked for.
-        Field {
-            name: "peak_n",
-            min: -1e6,
-            max: 1e6,
-            place: |p| &mut p.peak_n,
-        },
-        Field {
-            name: "curvature",
-            min: -100.0,
-            max: 1.0,
-            place: |p| &mut p.curvature,
-        },
-    ];
 }

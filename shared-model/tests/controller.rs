@@ -1,9 +1,10 @@
 //! The controller: the driver's request, the dither's switch, and how fast both may move.
 
 use shared_model::Scenario;
-use shared_model::controller::{Controller, Policy};
+use shared_model::controller::Controller;
 use shared_model::dither::Waveform;
-use shared_model::schedule::Table;
+use shared_model::ecu_schedule::Table;
+use shared_model::policy::Policy;
 use shared_model::signal::Measurement;
 
 const OHM: f32 = 0.3;

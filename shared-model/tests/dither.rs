@@ -105,7 +105,7 @@ fn oscillator_sine_error_is_as_stated() {
         let exact = libm::sin(f64::from(k) / f64::from(SAMPLES) * TAU);
         worst = worst.max((f64::from(oscillator.sample::<f32>()) - exact).abs());
     }
-    // Both ways: a bound far above the truth would say nothing.
+    // Both ways: a bound far above the true value would be worthless.
     assert!(worst <= OSCILLATOR_SINE_ERROR, "error {worst}");
     assert!(
         worst > 0.8 * OSCILLATOR_SINE_ERROR,

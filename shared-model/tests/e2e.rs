@@ -49,7 +49,7 @@ fn every_status_by_its_sequence() {
         (&[0, 3, 4], &[Ok, OkSomeLost, Ok]),
         (&[0, 4, 5], &[Ok, WrongSequence, Ok]),
         (&[0, 0, 1], &[Ok, Repeated, Ok]),
-        // Swapped: behind the last one is out of sequence, and so the tolerated step counts from there.
+        // Swapped: a counter below the last one is out of sequence, and so the tolerated step counts from there.
         (&[0, 2, 1, 3], &[Ok, OkSomeLost, WrongSequence, OkSomeLost]),
         // Before the first frame the receiver expects a sender that has just started.
         (&[2, 3], &[OkSomeLost, Ok]),
@@ -116,7 +116,7 @@ fn every_step_from_every_counter() {
     }
 }
 
-/// A frame that is not whole says nothing about the sequence.
+/// A frame that is not whole does not affect the sequence.
 #[test]
 fn damage_and_silence_leave_the_counter() {
     let frames = frames(0..3);
@@ -131,7 +131,7 @@ fn damage_and_silence_leave_the_counter() {
     assert_eq!(receiver.check(Some(&frames[1])), Status::Ok);
 }
 
-/// What the package autosar-e2e 1.0.0 makes of zeros; `tests/frames.rs` asks it about frames of all kinds.
+/// The result of the package autosar-e2e 1.0.0 for zeros; `tests/frames.rs` compares frames of all kinds with it.
 #[test]
 fn known_answers() {
     let mut sender = Sender::new(DATA_ID);
@@ -188,7 +188,7 @@ proptest! {
                 prop_assert_eq!(receiver().check(Some(&damaged)), Status::Error, "flips of {}, {}, {}", bit, first, second);
             }
         }
-        // Of up to 16 bits, anywhere behind the header.
+        // Of up to 16 bits, anywhere after the header.
         let mut damaged = frame;
         let start = 2 + first % (FRAME_LEN - 3);
         let [high, low] = burst.to_be_bytes();

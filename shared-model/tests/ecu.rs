@@ -37,7 +37,7 @@ fn measurement(current_request_a: f32) -> Measurement<f32> {
     }
 }
 
-/// An ECU with a perfect clock, and a pin that shows what is put out.
+/// An ECU with a perfect clock, and a pin that shows its output.
 #[derive(Clone)]
 struct Rig {
     ecu: Ecu<f32>,
@@ -138,7 +138,7 @@ fn starts_with_the_first_frame_and_tells_it() {
     }
 }
 
-/// What a tick computes goes out from the next one on: the duties of its periods, the frame with the last of them.
+/// The result of a tick is put out from the next one on: the duties of its periods, the frame with the last of them.
 #[test]
 fn a_command_acts_one_tick_later() {
     let pwm = Pwm::new(&scenario().servo, 10_000.0);
@@ -172,7 +172,7 @@ fn an_actuator_frame_goes_out_once_a_tick() {
         };
         rig.ecu.period(answer, || TICK_COUNTS);
     }
-    // The first tick has nothing to tell yet.
+    // The first tick has nothing to report yet.
     assert_eq!(sent, [19, 29, 39, 49]);
 }
 
@@ -353,7 +353,7 @@ fn tasks_compare_their_channels_before_a_result_is_used() {
     let mut output = rig.good_tick(10.0);
     output.setpoints[1].motor_v = 2.99;
     rig.ecu.pwm.accept(&output);
-    // A tick later the accepted values are right again; what was found stays.
+    // A tick later the accepted values are right again; the fault stays.
     let output = rig.good_tick(10.0);
     assert_safe(&output, Fault::ChannelsDiffer);
     assert_eq!(output.setpoints[0], output.setpoints[1]);
@@ -442,7 +442,7 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
         let message = refusal(&bad);
         assert!(message.contains(name), "{message}");
     }
-    // Without dither nobody asks for its frequency.
+    // Without dither its frequency is not checked.
     let none = [
         "dither.waveform=none",
         "gate.dither_frequency_max_rad_per_s=1e6",
@@ -482,7 +482,8 @@ fn any_tick() -> impl Strategy<Value = (Frame, u32, u16, f32)> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
-    /// Whatever comes in: every duty is one of the timer's and within the gate's voltages, and a fault ends in neutral for good.
+    /// Whatever comes in: every duty is one of the timer's and within the gate's voltages, and a fault ends in neutral
+    /// for good.
     #[test]
     fn nothing_that_comes_in_gets_past(
         ticks in prop::collection::vec(any_tick(), 1..300),

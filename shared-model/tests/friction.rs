@@ -38,8 +38,8 @@ prop_compose! {
         law in prop::sample::select(vec![FrictionLaw::CoulombRate, FrictionLaw::PrintedAngle]),
         dithered: bool,
         waveform in prop::sample::select(vec![Waveform::None, Waveform::Square, Waveform::Sine]),
-        // At the steering rate's sign 0.02 rad/s and more: a square wave of less has its two steps so near to each other that
-        // one integration step may pass both.
+        // At the steering rate's sign 0.02 rad/s and more: a square wave of less has its two steps so near to each other
+        // that one integration step may pass both.
         amplitude_v in prop_oneof![Just(0.0), 1e-5..1e-3_f64, 1e-3..0.2_f64],
         wheel_speed_rpm in 800.0..2000.0_f64,
         x in (-0.2..0.2_f64, -0.5..0.5_f64, -0.5..0.5_f64, -0.5..0.5_f64),
@@ -73,7 +73,7 @@ proptest! {
         prop_assert!((square - halves).abs() < 1e-12);
     }
 
-    /// Friction knows no direction, and is never more than its limit.
+    /// Friction has no preferred direction, and is never above its limit.
     #[test]
     fn sign_is_odd_and_bounded(injection in injection(), u in -2.0..2.0_f64) {
         let (value, mirror) = (Sign::new(injection).at(u), Sign::new(mirrored(injection)).at(-u));
@@ -109,13 +109,13 @@ proptest! {
     }
 
     /// No crossing is reported on the mode's own side; one that is reported lies between the two arguments, and the mode
-    /// behind it is the next one on the way.
+    /// after it is the next one on the way.
     #[test]
     fn crossing_lies_on_the_way(injection in injection(), from in -2.0..2.0_f64, to in -2.0..2.0_f64) {
         let sign = Sign::new(injection);
         let (mode, target) = (sign.mode(from), sign.mode(to));
         prop_assert_eq!(sign.crossing(mode, from), None);
-        let Some((threshold, behind)) = sign.crossing(mode, to) else {
+        let Some((threshold, mode_after)) = sign.crossing(mode, to) else {
             prop_assert_eq!(mode, target, "a change of mode was missed");
             return Ok(());
         };
@@ -124,9 +124,9 @@ proptest! {
         let next_on_the_way = (threshold + to) * 0.5;
         let apart = matches!(sign, Sign::Stepped { lower, upper } if lower < upper);
         if apart && mode != FrictionMode::Neutral {
-            prop_assert_eq!(behind, FrictionMode::Neutral, "between the two steps");
+            prop_assert_eq!(mode_after, FrictionMode::Neutral, "between the two steps");
         } else {
-            prop_assert_eq!(behind, sign.mode(next_on_the_way));
+            prop_assert_eq!(mode_after, sign.mode(next_on_the_way));
         }
     }
 
@@ -145,7 +145,7 @@ proptest! {
 
     /// Coulomb friction only takes energy from the steering: its torque times the rate is never negative, along
     /// trajectories through slip, stick and every mean dither. The torque is the difference to the same model without it.
-    /// The mode behind a change is held for the rest of the step; what the torques change by in a step, some 0.5 N m, may
+    /// The mode after a change is held for the rest of the step; what the torques change by in a step, some 0.5 N m, may
     /// turn the rate around by 5e-5 rad/s in it: 3e-4 W, a ten-thousandth of the power in motion.
     #[test]
     fn coulomb_friction_does_no_work_on_the_steering(
@@ -184,7 +184,7 @@ proptest! {
         sticks::<f32>(x, current_a, false)?;
     }
 
-    /// Friction that will be dithered sticks all the same before the dither sets in.
+    /// Friction that will be dithered sticks before the dither starts.
     #[test]
     fn coulomb_friction_sticks_until_it_is_dithered(
         x in (-0.3..0.3_f64, -0.3..0.3_f64, -0.6..0.6_f64), current_a in -15.0..15.0_f64,

@@ -210,7 +210,7 @@ fn motor_limits_end_at_a_number() {
     }
 }
 
-/// What the limit lets through exactly, a controller at that limit must be able to command for ever.
+/// A controller at a limit that the gate passes exactly must be able to command it permanently.
 #[test]
 fn a_controller_at_the_limits_raises_no_alarm() {
     let mut supervisor = supervisor(Waveform::Square);
@@ -339,7 +339,7 @@ fn what_is_found_outside_is_a_fault_in_every_mode() {
         });
         assert_only(&starting, fault);
     }
-    // A bit without a name is a fault all the same.
+    // A bit without a name is a fault, too.
     let mut nameless = active_at(Waveform::Square, 0.0);
     nameless.run(&Observation {
         found_outside: Faults::from_bits(1 << 31),
@@ -404,7 +404,7 @@ fn safe_state_ramps_out_and_is_latched() {
         assert!((last.dither_amplitude_v - (amplitude_v - 2e-3).max(0.0)).abs() < 1e-6);
         let (mut motor_ticks, mut dither_ticks) = (1, 1);
         for tick in 0..5000 {
-            // Nothing that is commanded or measured from now on has a say.
+            // Later commands and measurements have no effect.
             let any = match tick % 4 {
                 0 => command(f32::NAN, f32::INFINITY),
                 1 => command(-4.5, 0.2),
@@ -453,7 +453,7 @@ fn a_restart_forgets_the_fault() {
     assert_clean(&active_at(Waveform::Square, 0.0));
 }
 
-/// Rates other than the preset's scale what happens in a tick.
+/// Rates other than the preset's scale the changes in a tick.
 #[test]
 fn limits_are_by_time_not_by_tick() {
     let mut scenario = scenario(Waveform::Sine);

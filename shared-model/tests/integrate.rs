@@ -176,7 +176,7 @@ proptest! {
         prop_assert!(error < 0.01 * 0.5 * limit / 10.0 * step_s * step_s, "off by {error} rad");
     }
 
-    /// A motor stronger than the friction turns the steering around: behind the crossing the other mode holds, and the
+    /// A motor stronger than the friction turns the steering around: after the crossing the other mode holds, and the
     /// rate at the end of the step is that of the piecewise closed form without damping.
     #[test]
     fn rate_turns_around_within_the_step(share in 0.05..0.95_f64, current_a in 5.0..15.0_f64) {
@@ -199,7 +199,7 @@ proptest! {
 }
 
 /// The steering breaks loose in the middle of a step, where the tyres' growing torque passes the friction's limit, and not
-/// only at the next step: the rate behind the step is that of steps a thousand times as short.
+/// only at the next step: the rate after the step is that of steps a thousand times as short.
 #[test]
 fn release_is_within_the_step() {
     let step_s = 1e-3;

@@ -138,7 +138,7 @@ fn a_frequency_a_sample_outside_is_found_in_its_first_period() {
                         continue;
                     }
                     let scenario = scenario(waveform, pwm_rate_hz, frequency);
-                    // The half period in which it sets in, and a whole one to the sample behind it.
+                    // The half period in which it sets in, and a whole one to the sample after it.
                     let latest = 2.0 * samples.min(longest) + 3.0;
                     let found = found(&scenario, onset, 1000).unwrap();
                     assert!(
@@ -175,7 +175,8 @@ fn a_frequency_barely_outside_is_found_by_its_drift() {
     }
 }
 
-/// Runs half periods of these many samples, the first one positive, at amplitude 0.1 V; the fault and the sample it comes at.
+/// Runs half periods of these many samples, the first one positive, at amplitude 0.1 V; the fault and the sample it comes
+/// at.
 fn squares(limiter: &mut Limiter<f32>, half_periods: &[u32]) -> Option<u32> {
     let signs = half_periods.iter().zip([1.0, -1.0].into_iter().cycle());
     let samples = signs.flat_map(|(&samples, sign)| std::iter::repeat_n(sign, samples as usize));

@@ -25,7 +25,7 @@ fn all() -> impl Iterator<Item = Scenario<f32>> {
         .flat_map(|waveform| APPLICATIONS.map(|application| scenario(waveform, application)))
 }
 
-/// Duties of so many PWM periods, and how many each step took.
+/// Duties of a number of PWM periods, and their number in each step.
 fn duties(scenario: &Scenario<f32>, periods: usize) -> (Vec<Duty>, Vec<usize>) {
     let mut ecu = OpenLoop::new(scenario).unwrap();
     let (mut duties, mut counts) = (Vec::new(), Vec::new());
@@ -161,7 +161,7 @@ fn model_sees_the_dither_from_its_start() {
     }
 }
 
-/// What the firmware does in two interrupts and the host in one loop.
+/// The firmware's two interrupts and the host's one loop are equal.
 #[test]
 fn step_equals_the_two_tasks_by_hand() {
     for scenario in all() {

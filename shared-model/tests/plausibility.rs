@@ -39,7 +39,7 @@ fn with(mut measurement: Measurement<f32>, signal: Signal, value: f32) -> Measur
     measurement
 }
 
-/// What a first measurement shows.
+/// Faults of a first measurement.
 fn first(measurement: Measurement<f32>) -> Faults {
     watch(&limits()).check(Some(&measurement))
 }
@@ -279,7 +279,7 @@ fn angle_and_rate_must_not_contradict_each_other() {
             assert_eq!(contradiction(sign * 0.26, ticks), inconsistent);
         }
     }
-    // Angle that moves at constant speed while the rate says nothing.
+    // Angle that moves at constant speed while the rate is zero.
     let mut watch = watch(&limits());
     let found = (0..1000).map(|tick| {
         let measurement = with(at_rest(), ANGLE, 1e-3 * tick as f32);

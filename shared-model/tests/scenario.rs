@@ -12,7 +12,7 @@ use std::str::FromStr;
 
 const PRESETS: [Preset; 2] = [Preset::Reconstruction, Preset::Printed];
 
-/// Calls the check with every section's name and place; adds up what it counts.
+/// Calls the check with every section's name and place; adds up its counts.
 macro_rules! each_section {
     ($check:ident::<$t:ty>) => {
         $check::<$t, _>("vehicle", |s| &mut s.vehicle)
@@ -28,8 +28,8 @@ macro_rules! each_section {
     };
 }
 
-/// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and run. The sections' lists and the
-/// map of a scenario are both held to it.
+/// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and run. The sections'
+/// lists and the map of a scenario are both held to it.
 const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 5 + 24 + 8;
 
 /// The floats next to a bound.
@@ -56,8 +56,8 @@ impl Neighbours for f64 {
     }
 }
 
-/// Every number of a section: what is not finite or not in its range is refused with a message that names it; the bounds
-/// themselves are allowed. Returns how many there are.
+/// Every number of a section: a value that is not finite or not in its range is refused with a message that names it; the
+/// bounds themselves are allowed. Returns how many there are.
 fn ranges<T: Neighbours, P: ParameterSet<T>>(
     section: &'static str,
     of: fn(&mut Scenario<T>) -> &mut P,
@@ -67,7 +67,7 @@ fn ranges<T: Neighbours, P: ParameterSet<T>>(
         let [nan, infinity] = [f64::NAN, f64::INFINITY].map(T::from_f64);
         for bad in [nan, infinity, -infinity, min.down(), max.up()] {
             let mut scenario = Scenario::<T>::reconstruction();
-            *(field.place)(of(&mut scenario)) = bad;
+            *(field.accessor)(of(&mut scenario)) = bad;
             let Err(InvalidScenario::OutOfRange(error)) = scenario.validate() else {
                 panic!("{section}.{} = {bad:?} was taken", field.name);
             };
@@ -86,7 +86,7 @@ fn ranges<T: Neighbours, P: ParameterSet<T>>(
         }
         for good in [min, max] {
             let mut scenario = Scenario::<T>::reconstruction();
-            *(field.place)(of(&mut scenario)) = good;
+            *(field.accessor)(of(&mut scenario)) = good;
             assert_eq!(
                 of(&mut scenario).validate(),
                 Ok(()),
@@ -106,7 +106,7 @@ fn set_by_name<T: Neighbours, P: ParameterSet<T>>(
     for field in P::FIELDS {
         let mut scenario = Scenario::<T>::reconstruction();
         let mut expected = scenario;
-        *(field.place)(of(&mut expected)) = T::from_f64(-0.125);
+        *(field.accessor)(of(&mut expected)) = T::from_f64(-0.125);
         let setting = format!("{section}.{}=-0.125", field.name);
         assert_eq!(scenario.apply(&setting), Ok(()), "{setting}");
         assert_eq!(scenario, expected, "{setting}");
@@ -347,12 +347,13 @@ fn long_runs_have_the_nearest_count() {
 
 /// Names of a choice are read back as that choice, and only they.
 fn names<C: Choice + std::fmt::Debug>(names: &[&str]) {
-    let known: Vec<&str> = C::ALL.iter().map(|&(name, _)| name).collect();
+    let known: Vec<&str> = C::ALL.iter().map(|choice| choice.name()).collect();
     assert_eq!(known, names, "the configuration file's names");
-    for (index, &(name, choice)) in C::ALL.iter().enumerate() {
+    for (index, &choice) in C::ALL.iter().enumerate() {
+        let name = choice.name();
         assert_eq!(C::from_name(name), Some(choice));
         assert!(
-            C::ALL[..index].iter().all(|&(_, other)| other != choice),
+            C::ALL[..index].iter().all(|&other| other != choice),
             "{choice:?} has one name"
         );
         assert_eq!(C::from_name(&name.to_uppercase()), None);
@@ -373,7 +374,8 @@ fn choices_have_their_names() {
 
 /// Every choice arrives at its place, and an unknown name is refused.
 fn chosen<C: Choice + std::fmt::Debug>(key: &str, of: fn(&mut Scenario<f64>) -> &mut C) {
-    for &(name, choice) in C::ALL {
+    for &choice in C::ALL {
+        let name = choice.name();
         let mut scenario = Scenario::reconstruction();
         let mut expected = scenario;
         *of(&mut expected) = choice;
@@ -477,7 +479,8 @@ mod file {
     use serde::de::{DeserializeOwned, IntoDeserializer};
 
     fn choice<C: Choice + DeserializeOwned + std::fmt::Debug>() {
-        for &(name, choice) in C::ALL {
+        for &choice in C::ALL {
+            let name = choice.name();
             let text: StrDeserializer<'_, Error> = name.into_deserializer();
             assert_eq!(C::deserialize(text).unwrap(), choice, "{name}");
         }
@@ -497,7 +500,7 @@ mod file {
         let mut copy = set;
         let mut entries: Vec<(&str, f64)> = P::FIELDS
             .iter()
-            .map(|field| (field.name, *(field.place)(&mut copy)))
+            .map(|field| (field.name, *(field.accessor)(&mut copy)))
             .collect();
         let read = |entries: &[(&'static str, f64)]| {
             P::deserialize(MapDeserializer::<_, Error>::new(entries.iter().copied()))

@@ -53,7 +53,7 @@ fn monotone<T: Real>(bus_v: f64, period: u16, low: f64, high: f64) -> Result<(),
     Ok(())
 }
 
-/// The two ends, reached exactly and never passed; NaN says nothing, so it means no voltage.
+/// The two ends, reached exactly and never passed; NaN means no voltage.
 fn ends<T: Real>(bus_v: f64, period: u16, greatest: f64) -> Result<(), TestCaseError> {
     let pwm = pwm::<T>(bus_v, period);
     for beyond in [

@@ -42,9 +42,9 @@ prop_compose! {
 prop_compose! {
     fn trailer()(
         exit_code: u32, records: u32, overruns: u32, stack_bytes: u32, final_duty: u16, neutral_duty: u16,
-        least_spacing: u16, most_spacing: u16,
+        min_interval: u16, max_interval: u16,
     ) -> Trailer {
-        Trailer { exit_code, records, overruns, stack_bytes, final_duty, neutral_duty, least_spacing, most_spacing }
+        Trailer { exit_code, records, overruns, stack_bytes, final_duty, neutral_duty, min_interval, max_interval }
     }
 }
 
@@ -77,7 +77,7 @@ fn encode_trailer(trailer: &Trailer) -> Vec<u8> {
     buffer.to_vec()
 }
 
-/// Every single-bit flip is refused; every cut is reported with the bytes that are missing; a longer stream behind the
+/// Every single-bit flip is refused; every cut is reported with the bytes that are missing; a longer stream after the
 /// frame does not matter.
 fn check_damage<F>(
     frame: &[u8],

@@ -58,7 +58,7 @@ fn square_mean(f: impl Fn(f64) -> f64, y: f64, amplitude: f64) -> f64 {
     (0..POINTS).map(at).sum::<f64>() / f64::from(POINTS)
 }
 
-/// A tyre does not know left from right. Without dither and under a square wave this holds to the bit, in every
+/// A tyre is symmetric. Without dither and under a square wave this holds to the bit, in every
 /// arithmetic; under a sine the quadrature adds in another order.
 fn odd<T: Real>(tire: &Tire<T>, alpha: T, amplitude: T) -> Result<(), TestCaseError> {
     for injection in [Injection::Off, Injection::SquareMean { amplitude }] {
@@ -87,8 +87,8 @@ proptest! {
         prop_assert!(sum.abs() <= 1e-14 * magnitude, "odd to rounding, not to {sum} N");
     }
 
-    /// The sign is the paper's: the force pushes with the slip angle, up to the zero of the cubic force, which is at 0.142 rad
-    /// for the rear tyre of set A and farther out for the others.
+    /// The sign is the paper's: the force pushes with the slip angle, up to the zero of the cubic force, which is at
+    /// 0.142 rad for the rear tyre of set A and farther out for the others.
     #[test]
     fn force_has_the_sign_of_the_slip(axle in axle(), model in model(), alpha in 1e-6..0.142_f64) {
         prop_assert!(Tire::new(model, &axle).force(alpha, Injection::Off) > 0.0);

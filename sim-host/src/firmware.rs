@@ -2,7 +2,7 @@
 
 use image::stack::Priority;
 
-/// Priorities of the firmware's code in rising order, as `firmware/src/app.rs` sets them.
+/// Priorities of the firmware's code in rising order, as `firmware/src/interrupts.rs` sets them.
 pub const PRIORITIES: [Priority; 5] = [
     priority("main program", &["Reset"]),
     priority("control task", &["PendSV"]),

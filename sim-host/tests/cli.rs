@@ -403,8 +403,8 @@ fn telemetry_of(duties: &[u16]) -> Vec<u8> {
         stack_bytes: 1000,
         final_duty: 1250,
         neutral_duty: 1250,
-        least_spacing: 2499,
-        most_spacing: 2501,
+        min_interval: 2499,
+        max_interval: 2501,
     };
     let length = trailer.encode(&mut buffer);
     stream.extend(&buffer[..length]);

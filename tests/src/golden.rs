@@ -18,7 +18,7 @@ pub struct Figure {
     pub name: String,
     /// The figure.
     pub value: f64,
-    /// What it may be at most, whatever the compiler.
+    /// Greatest value, whatever the compiler.
     pub limit: Option<f64>,
     /// Unit.
     pub unit: &'static str,
@@ -54,8 +54,8 @@ impl Figure {
     }
 }
 
-/// Compares figures with the file `name`, and every figure with its limit. With another compiler than the file's, which makes
-/// other code, names and limits alone are compared, and it is said that the figures were not.
+/// Compares figures with the file `name`, and every figure with its limit. With another compiler than the file's, which
+/// makes other code, names and limits alone are compared, and a message reports that the figures were not.
 ///
 /// # Panics
 /// If a figure is above its limit, is missing, or differs.
@@ -116,7 +116,7 @@ pub fn check_text(name: &str, text: &str) {
 }
 
 fn hint() -> &'static str {
-    "if that is meant, run `cargo xtask proofs --overwrite-expected` and look at the difference"
+    "if that is meant, run `cargo xtask proofs --overwrite-expected` and review the difference"
 }
 
 fn overwrites() -> bool {

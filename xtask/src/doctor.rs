@@ -1,14 +1,14 @@
-//! `cargo xtask doctor`: what is needed, what is there, what set-up would do.
+//! `cargo xtask doctor`: required tools, installed tools, steps of set-up.
 
 use anyhow::{Result, bail};
 
-use crate::setup::{python, qemu, target};
+use crate::setup::{probe, python, qemu, target};
 use crate::{rustup, workspace};
 
-/// One thing that is needed.
+/// A required tool.
 struct Item {
     need: String,
-    /// What is there, or else what brings it.
+    /// The installed version, or else the steps that install it.
     state: Result<String, String>,
 }
 
@@ -61,7 +61,7 @@ fn target() -> Result<Item> {
         }
     };
     Ok(Item {
-        need: target::TARGET.to_owned(),
+        need: probe::TARGET.to_owned(),
         state,
     })
 }

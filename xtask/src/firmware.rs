@@ -6,10 +6,10 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::setup::target::TARGET;
+use crate::setup::probe::TARGET;
 use crate::{process, rustup, workspace};
 
-/// The board that everything runs on unless it is told otherwise. Its images are where a plain `cargo build` puts them.
+/// The default board. Its images are where a plain `cargo build` puts them.
 pub const USUAL_BOARD: &str = "mps2";
 
 /// All boards: the folders in the firmware's `src/board`.
@@ -36,17 +36,30 @@ pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
 }
 
 fn cargo_into(toolchain: &str, command: &str, board: &str, target_dir: &Path) -> Result<Command> {
+    let mut cargo = cargo_for_target(toolchain, command, target_dir)?;
+    cargo
+        .arg("--no-default-features")
+        .arg(format!("--features=board-{board}"));
+    Ok(cargo)
+}
+
+/// A command of cargo on a package for the usual board.
+pub fn cargo_on(toolchain: &str, command: &str, package: &str) -> Result<Command> {
+    let mut cargo = cargo_for_target(toolchain, command, &target_dir(USUAL_BOARD)?)?;
+    cargo.args(["--package", package]);
+    Ok(cargo)
+}
+
+fn cargo_for_target(toolchain: &str, command: &str, target_dir: &Path) -> Result<Command> {
     let mut cargo = rustup::cargo(toolchain)?;
     cargo
         .current_dir(workspace::firmware())
         .arg(command)
         .args(["--profile", "firmware"])
         .args(workspace::locked())
-        .arg("--no-default-features")
-        .arg(format!("--features=board-{board}"))
         .arg("--target-dir")
         .arg(target_dir);
-    // These would replace what that configuration says: its target, and its linker arguments.
+    // These would override that configuration: its target, and its linker arguments.
     for variable in [
         "RUSTFLAGS",
         "CARGO_ENCODED_RUSTFLAGS",
@@ -60,7 +73,7 @@ fn cargo_into(toolchain: &str, command: &str, board: &str, target_dir: &Path) ->
 
 /// A build of the ECU's program with a section `.stack_sizes`, the frame of each function, in a folder of its own.
 ///
-/// The option is not stable yet. For one crate alone it may be used all the same, and as that crate's compilation makes the
+/// The option is not stable yet. For one crate alone it may still be used, and as that crate's compilation makes the
 /// code of all others, too, the frames are those of the whole program. The code is that of [`build`].
 pub fn framed(toolchain: &str, board: &str) -> Result<Command> {
     let mut cargo = cargo_into(toolchain, "rustc", board, &framed_target_dir(board)?)?;
@@ -70,7 +83,7 @@ pub fn framed(toolchain: &str, board: &str) -> Result<Command> {
     Ok(cargo)
 }
 
-/// What [`framed`] builds.
+/// The image that [`framed`] builds.
 pub fn framed_elf(board: &str) -> Result<PathBuf> {
     Ok(framed_target_dir(board)?
         .join(TARGET)

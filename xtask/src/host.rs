@@ -1,4 +1,4 @@
-//! The machine's package managers: what to run, or the line to type.
+//! The machine's package managers: the command to run, or the line to type.
 
 use std::io::{self, IsTerminal};
 use std::process::Command;
@@ -7,28 +7,18 @@ use anyhow::{Result, bail};
 
 use crate::process;
 
-/// The package managers with a line to type, in the order they are looked for.
-const MANAGERS: [Manager; 5] = [
-    Manager::Apt,
-    Manager::Dnf,
-    Manager::Pacman,
-    Manager::Brew,
-    Manager::Winget,
-];
+/// The supported package managers, in the order of the search.
+const MANAGERS: [Manager; 3] = [Manager::Apt, Manager::Dnf, Manager::Pacman];
 
 /// A package manager.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Manager {
-    /// Debian, Ubuntu; the only one that set-up uses by itself.
+    /// Debian, Ubuntu; the only one that set-up runs itself.
     Apt,
     /// Fedora.
     Dnf,
     /// Arch.
     Pacman,
-    /// macOS.
-    Brew,
-    /// Windows.
-    Winget,
 }
 
 impl Manager {
@@ -44,8 +34,6 @@ impl Manager {
             Self::Apt => "apt-get",
             Self::Dnf => "dnf",
             Self::Pacman => "pacman",
-            Self::Brew => "brew",
-            Self::Winget => "winget",
         }
     }
 
@@ -55,8 +43,6 @@ impl Manager {
             Self::Apt => "sudo apt-get update && sudo apt-get install python3-venv",
             Self::Dnf => "sudo dnf install python3",
             Self::Pacman => "sudo pacman -S python",
-            Self::Brew => "brew install python",
-            Self::Winget => "winget install Python.Python.3.13",
         }
     }
 
@@ -68,8 +54,6 @@ impl Manager {
             }
             Self::Dnf => "sudo dnf install arm-none-eabi-gcc-cs arm-none-eabi-newlib",
             Self::Pacman => "sudo pacman -S arm-none-eabi-gcc arm-none-eabi-newlib",
-            Self::Brew => "brew install --cask gcc-arm-embedded",
-            Self::Winget => "winget install Arm.GnuArmEmbeddedToolchain",
         }
     }
 
@@ -81,25 +65,21 @@ impl Manager {
             }
             Self::Dnf => "sudo dnf install qemu-system-arm",
             Self::Pacman => "sudo pacman -S qemu-system-arm",
-            Self::Brew => "brew install qemu",
-            Self::Winget => {
-                "winget install SoftwareFreedomConservancy.QEMU (and add its folder to PATH)"
-            }
         }
     }
 }
 
-/// How xtask may install packages.
+/// How xtask can install packages.
 #[derive(Clone, Copy)]
 pub enum Apt {
-    /// It is root.
+    /// As root.
     Root,
-    /// sudo can ask for a password on the terminal.
+    /// With sudo, which prompts for a password on the terminal.
     Sudo,
 }
 
 impl Apt {
-    /// `None` where there is no apt-get, or nobody who could type a password.
+    /// `None` where there is no apt-get, or no terminal for a password.
     pub fn here() -> Option<Self> {
         process::find("apt-get")?;
         if process::capture(Command::new("id").arg("-u")).as_deref() == Some("0") {
@@ -108,10 +88,10 @@ impl Apt {
         (io::stdin().is_terminal() && process::find("sudo").is_some()).then_some(Self::Sudo)
     }
 
-    /// Fetches the lists of packages. A source that fails is no reason to stop: another may have what is needed.
+    /// Fetches the lists of packages. A source that fails is no reason to stop: another may have the package.
     pub fn update(self) -> Result<()> {
         if !process::status(self.apt_get().args(["-q", "update"]))?.success() {
-            println!("   apt-get update did not fetch everything; going on with what is known");
+            println!("   apt-get update did not fetch everything; continuing with the known lists");
         }
         Ok(())
     }
@@ -125,7 +105,7 @@ impl Apt {
         self.install(&[package])
     }
 
-    /// Installs packages without what they merely recommend.
+    /// Installs packages without the recommended ones.
     pub fn install(self, packages: &[&str]) -> Result<()> {
         let mut command = self.apt_get();
         command
@@ -155,7 +135,7 @@ impl Apt {
     }
 }
 
-/// The version that apt would install; `None` if it knows no such package.
+/// The version that apt would install; `None` if there is no such package.
 pub fn candidate(package: &str) -> Option<String> {
     let policy = process::capture(
         Command::new("apt-cache")

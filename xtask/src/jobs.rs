@@ -1,4 +1,4 @@
-//! The commands that do something: each a few stages, with their times.
+//! The commands that build and test: each a few stages, with their times.
 
 pub mod coverage;
 pub mod demo;
@@ -18,7 +18,7 @@ use anyhow::{Context, Result};
 
 use crate::{process, rustup, workspace};
 
-/// Runs one stage: says its name before, and its time after; an error carries its name.
+/// Runs one stage: prints its name before, and its time after; an error carries its name.
 fn stage<T>(name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
     println!("== {name}");
     let started = Instant::now();

@@ -1,7 +1,7 @@
 //! The single door to the repository: `cargo xtask <command>`.
 //!
-//! It sets up what is missing, builds, and starts programs. It knows no model: every verdict is the business of
-//! the program it starts.
+//! It installs missing tools, builds, and starts programs. It contains no model: every verdict comes from the program
+//! that it starts.
 
 mod doctor;
 mod firmware;
@@ -19,8 +19,8 @@ use clap::{Parser, Subcommand};
 
 /// Sets up, builds, tests and runs Dithersteer.
 ///
-/// Exit codes of every command: 0 all is well; 1 a test or a verdict failed; 2 it could not run.
-/// The last line says why, and what to do next.
+/// Exit codes of every command: 0 passed; 1 a test or a verdict failed; 2 it could not run.
+/// The last line has the reason, and the next step.
 #[derive(Parser)]
 #[command(
     name = "cargo xtask",
@@ -31,7 +31,7 @@ use clap::{Parser, Subcommand};
     after_help = "Examples:\n  cargo xtask demo     set up, build, run the firmware in QEMU, write the report\n  \
                         cargo xtask test     set up, build, run every test\n  \
                         cargo xtask proofs   worst stack, sizes, instructions of the firmware\n  \
-                        cargo xtask doctor   what is there, what is missing\n\n\
+                        cargo xtask doctor   installed and missing tools\n\n\
                         `cargo xtask help COMMAND` shows a command's own examples."
 )]
 struct Cli {
@@ -41,18 +41,18 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Shows what is needed, what is there, and what `setup` would do; changes nothing.
+    /// Shows the required tools, which of them are installed, and the steps of `setup`; changes nothing.
     ///
-    /// Exit code 0 when everything is there, 2 when something is missing.
+    /// Exit code 0 if everything is installed, 2 if something is missing.
     #[command(after_help = "Example:\n  cargo xtask doctor")]
     Doctor,
 
-    /// Installs what is missing, nothing twice, and builds the runner.
+    /// Installs missing tools and builds the runner.
     ///
-    /// Says what it installs, and where, before it does it. The compiler's target comes from rustup, or where
+    /// Each installation is announced with its place before it begins. The compiler's target comes from rustup, or where
     /// rustup cannot download, from Debian's Rust packages; QEMU comes from the system's packages. The runner is
-    /// the program that `cargo run` in firmware/ starts. Python packages that tests compare with go into
-    /// target/python, and into no Python of this machine.
+    /// the program that `cargo run` in firmware/ starts. Python packages for the tests go into
+    /// target/python; the system's Python is not changed.
     #[command(
         after_help = "Example:\n  cargo xtask setup && cd firmware && cargo run --profile firmware --bin ecu"
     )]
@@ -71,25 +71,25 @@ enum Command {
     #[command(after_help = "Example:\n  cargo xtask test")]
     Test,
 
-    /// Builds every board's firmware, proves what can be proved of it, and compares it with tests/golden.
+    /// Builds every board's firmware, and compares its proofs with tests/golden.
     ///
-    /// Panic-free link, worst stack, flash and RAM, instructions of the tasks, spacing of the interrupts, and a reason for
+    /// Panic-free link, worst stack, flash and RAM, instructions of the tasks, jitter of the interrupts, and a reason for
     /// every `unsafe`.
     #[command(after_help = "Examples:\n  cargo xtask proofs\n  \
                             cargo xtask proofs --overwrite-expected && git diff tests/golden")]
     Proofs {
-        /// Write the figures into tests/golden instead of comparing them; limits hold all the same.
+        /// Write the figures into tests/golden instead of comparing them; limits still apply.
         #[arg(long)]
         overwrite_expected: bool,
     },
 
-    /// Counts the instructions of the model's step and the ECU's tasks on the target, and of the same in C by GCC -O3.
+    /// Counts the instructions of the model's step and the ECU's tasks on the target, beside the C reference by GCC -O3.
     ///
-    /// Fails if a bit of their outputs differs, or if Rust takes more. Needs arm-none-eabi-gcc; says what to install where it is
-    /// missing.
+    /// Fails if a bit of their outputs differs, or if Rust takes more. Needs arm-none-eabi-gcc; the error message names the
+    /// package.
     #[command(after_help = "Example:\n  cargo xtask target-cost")]
     TargetCost {
-        /// Write the figures into tests/golden/cost.txt instead of comparing them; the limit holds all the same.
+        /// Write the figures into tests/golden/cost.txt instead of comparing them; the limit still applies.
         #[arg(long)]
         overwrite_expected: bool,
     },
@@ -114,24 +114,24 @@ enum Command {
     #[command(after_help = "Example:\n  cargo xtask package")]
     Package,
 
-    /// Runs the model's tests with a counter in each line; fails if a line of gate or controller is run by none.
+    /// Measures the line coverage of the model's tests; fails if a line of gate or controller is not covered.
     ///
-    /// Needs LLVM's llvm-profdata and llvm-cov; says what to install where they are missing.
+    /// Needs LLVM's llvm-profdata and llvm-cov; the error message names the package.
     #[command(after_help = "Example:\n  cargo xtask coverage")]
     Coverage,
 
-    /// Changes gate, controller and ECU program in hundreds of ways, and fails if the tests do not notice one.
+    /// Mutation tests of gate, controller and ECU program; fails if a mutation passes the tests.
     ///
-    /// Those that cannot be noticed are named, with the reason, in shared-model/mutants-survivors.txt. Takes about half an
+    /// Equivalent mutations are listed, with the reason, in shared-model/mutants-survivors.txt. Takes about half an
     /// hour on two cores, so it is no part of `test`. Installs cargo-mutants into target/tools.
     #[command(after_help = "Example:\n  cargo xtask mutants")]
     Mutants,
 
-    /// Gives hostile bytes to every reader of what comes from outside, led by coverage; fails at the first that panics,
-    /// hangs or takes too much memory.
+    /// Coverage-guided fuzzing of every reader of external data; fails at the first input that makes one panic, hang or
+    /// take too much memory.
     ///
     /// Needs a C++ compiler for libFuzzer. Takes some hours, so it is no part of `test`, which runs the corpus and a fixed
-    /// number of mutations. What is found is kept in target/fuzz and continued from.
+    /// number of mutations. Inputs found are kept in target/fuzz, and the next run continues from them.
     #[command(
         after_help = "Examples:\n  cargo xtask fuzz telemetry\n  cargo xtask fuzz --inputs 100000"
     )]

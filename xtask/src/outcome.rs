@@ -1,9 +1,9 @@
-//! Exit codes: 0 all is well, 1 a test or a verdict failed, 2 it could not run.
+//! Exit codes: 0 passed, 1 a test or a verdict failed, 2 it could not run.
 
 use std::fmt;
 use std::process::ExitCode;
 
-/// The code of everything that could not run; what any other error than [`Exit`] ends with.
+/// The code of an error other than [`Exit`]: the command could not run.
 pub const COULD_NOT_RUN: u8 = 2;
 
 /// An error that ends xtask with a code of its own.
@@ -46,7 +46,7 @@ fn code(result: &anyhow::Result<()>) -> u8 {
     }
 }
 
-/// Says why on the last line, and turns the result into xtask's exit code.
+/// Prints the reason on the last line, and turns the result into xtask's exit code.
 pub fn report(result: anyhow::Result<()>) -> ExitCode {
     if let Err(error) = &result {
         eprintln!("xtask: {error:#}");
@@ -60,7 +60,7 @@ mod tests {
     use anyhow::{Context, anyhow};
 
     #[test]
-    fn codes_are_told_apart() {
+    fn codes_are_distinct() {
         assert_eq!(code(&Ok(())), 0);
         assert_eq!(code(&Err(anyhow!("no such tool"))), 2);
         assert_eq!(code(&Err(Exit::failed("a test failed").into())), 1);

@@ -1,4 +1,4 @@
-//! Starts programs so that a person, or a log, always sees that something happens.
+//! Starts programs with visible progress, on a terminal and in a log.
 
 use std::env;
 use std::ffi::OsStr;
@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-/// A program that is silent for this long gets a line that says it still runs.
+/// After this time without output a line reports that the program is still running.
 const SILENCE: Duration = Duration::from_secs(20);
-/// How often a running program is looked at.
+/// Interval of polling a running program.
 const POLL: Duration = Duration::from_millis(100);
 
 /// How a streamed program ended.
@@ -58,7 +58,7 @@ pub fn stream(command: &mut Command, limit: Option<Duration>) -> Result<Ended> {
     let mut last_output = started;
     loop {
         if let Some(status) = child.try_wait()? {
-            // What is still in the pipe; not for ever, as a grandchild may hold its other end.
+            // The rest of the pipe; with a limit, as a grandchild may hold its other end.
             while let Some(Ok(bytes)) = output.as_ref().map(|o| o.recv_timeout(POLL)) {
                 forward(&bytes)?;
             }
@@ -84,7 +84,7 @@ pub fn stream(command: &mut Command, limit: Option<Duration>) -> Result<Ended> {
     }
 }
 
-/// What a program prints on its standard output, trimmed; `None` if it cannot start or does not succeed.
+/// The standard output of a program, trimmed; `None` if it cannot start or does not succeed.
 pub fn capture(command: &mut Command) -> Option<String> {
     let output = command
         .stdin(Stdio::null())
@@ -99,13 +99,12 @@ pub fn capture(command: &mut Command) -> Option<String> {
 
 /// The full path of a program on PATH.
 pub fn find(program: &str) -> Option<PathBuf> {
-    let name = format!("{program}{}", env::consts::EXE_SUFFIX);
     env::split_paths(&env::var_os("PATH")?)
-        .map(|folder| folder.join(&name))
+        .map(|folder| folder.join(program))
         .find(|path| path.is_file())
 }
 
-/// The command as one would type it.
+/// The command line.
 fn display(command: &Command) -> String {
     let words = [command.get_program()]
         .into_iter()

@@ -1,7 +1,7 @@
 //! Cargo and rustc of a chosen toolchain, through rustup.
 //!
-//! xtask itself was started by a cargo, which put its own toolchain and package into the environment. What it
-//! starts must see none of that.
+//! xtask itself was started by a cargo, which put its own toolchain and package into the environment. The programs that it
+//! starts must not inherit that.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -16,10 +16,7 @@ fn program() -> Option<PathBuf> {
     let home = env::var_os("CARGO_HOME")
         .map(PathBuf::from)
         .or_else(|| Some(env::home_dir()?.join(".cargo")));
-    let usual = home.map(|home| {
-        home.join("bin")
-            .join(format!("rustup{}", env::consts::EXE_SUFFIX))
-    });
+    let usual = home.map(|home| home.join("bin").join("rustup"));
     usual
         .filter(|path| path.is_file())
         .or_else(|| process::find("rustup"))
@@ -28,7 +25,7 @@ fn program() -> Option<PathBuf> {
 /// A `rustup` command line.
 pub fn rustup() -> Result<Command> {
     let program = program()
-        .context("rustup is missing: install it as https://rustup.rs says, then run this again")?;
+        .context("rustup is missing: install it (https://rustup.rs), then run this again")?;
     Ok(clean(Command::new(program)))
 }
 
@@ -58,7 +55,7 @@ pub fn rustc_version(toolchain: &str) -> Option<String> {
 pub fn folder(toolchain: &str) -> Result<PathBuf> {
     let rustc = process::capture(rustup()?.args(["which", "--toolchain", toolchain, "rustc"]));
     let rustc =
-        PathBuf::from(rustc.with_context(|| format!("rustup knows no toolchain {toolchain}"))?);
+        PathBuf::from(rustc.with_context(|| format!("rustup has no toolchain {toolchain}"))?);
     let folder = rustc.parent().and_then(Path::parent);
     Ok(folder
         .with_context(|| format!("{} is not inside a toolchain", rustc.display()))?
@@ -75,7 +72,7 @@ pub fn require_pinned() -> Result<String> {
     Ok(pinned)
 }
 
-/// Takes what the starting cargo said about itself and about xtask's package out of a command's environment.
+/// Removes the starting cargo's variables, and those of xtask's package, from a command's environment.
 fn clean(mut command: Command) -> Command {
     for (name, _) in env::vars_os() {
         if name.to_str().is_some_and(describes_xtask) {

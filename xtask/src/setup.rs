@@ -1,13 +1,14 @@
-//! Makes this machine ready: the compiler's target, QEMU, and for the tests Python packages.
+//! Prepares this machine: the compiler's target, QEMU, and for the tests Python packages.
 
 mod debian;
+pub mod probe;
 pub mod python;
 pub mod qemu;
 pub mod target;
 
 use anyhow::Result;
 
-/// Installs what is missing to build and run the firmware, and returns the toolchain that builds the firmware.
+/// Installs the missing tools that build and run the firmware, and returns the toolchain that builds the firmware.
 pub fn tools() -> Result<String> {
     let toolchain = target::ensure()?;
     qemu::ensure()?;

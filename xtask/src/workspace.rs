@@ -30,9 +30,7 @@ pub fn target_dir() -> Result<PathBuf> {
 
 /// The host's program, which is also the runner of the firmware's folder.
 pub fn sim_host() -> Result<PathBuf> {
-    Ok(target_dir()?
-        .join("release")
-        .join(format!("sim-host{}", env::consts::EXE_SUFFIX)))
+    Ok(target_dir()?.join("release").join("sim-host"))
 }
 
 /// The toolchain that `rust-toolchain.toml` pins.

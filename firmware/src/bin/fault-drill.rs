@@ -1,4 +1,4 @@
-//! Fault drill: the ECU's fault handlers, set off on purpose. The first setting, `fault=NAME`, says which.
+//! Fault drill: the ECU's fault handlers, triggered on purpose. The first setting, `fault=NAME`, selects one.
 //!
 //! `panic`, `hard-fault`, `stack-overflow`, `watchdog` (the main loop stops feeding it) and `hang` (interrupts and watchdog
 //! off, for the runner's time-out).

@@ -1,7 +1,7 @@
 //! Proof that the control path cannot panic: this image links only if no panic is reachable from its interrupts.
 //!
-//! The panic handler calls a function that nobody defines. Where the optimiser finds every panic unreachable, the handler
-//! and its call vanish; otherwise the linker misses the function, whose name says what went wrong. The feature
+//! The panic handler calls a function that is not defined. Where the optimiser finds every panic unreachable, the handler
+//! and its call vanish; otherwise the linker reports the function, whose name is the reason. The feature
 //! `reachable-panic` puts a panic into the path, to see that the proof can fail. The image is never run.
 
 #![no_std]
@@ -9,14 +9,14 @@
 
 use core::panic::PanicInfo;
 use core::ptr::read_volatile;
-use firmware::tasks::{self, ControlInterrupt, PwmInterrupt};
+use firmware::interrupts::{self, ControlInterrupt, PwmInterrupt};
 
 // SAFETY: there is no such function; where it is called, the link fails.
 unsafe extern "C" {
     fn a_panic_is_reachable_from_the_control_path() -> !;
 }
 
-/// Somewhere in RAM, so that the optimiser cannot know the tasks.
+/// An address in RAM, so that the tasks are unknown to the optimiser.
 const ANYWHERE: usize = 0x2000_8000;
 
 // SAFETY: the start-up code calls the function of this name, and there is no other.
@@ -31,7 +31,7 @@ extern "C" fn main() -> ! {
     };
     #[cfg(feature = "reachable-panic")]
     assert!(!matches!(control, ControlInterrupt::InLoop(_)), "provoked");
-    tasks::hand_over(pwm, control, 10);
+    interrupts::hand_over(pwm, control, 10);
     loop {
         cortex_m::asm::wfi();
     }

@@ -1,4 +1,4 @@
-//! What a board brings: a PWM, a clock for its interrupt, a watchdog, and a counter that measures the tasks.
+//! Requirements on a board: a PWM, a clock for its interrupt, a watchdog, and a counter that measures the tasks.
 //!
 //! A board is one folder here, with its code and its memory map, and one feature `board-<folder>`. The build takes exactly
 //! one. docs/porting.md leads through a port.
@@ -28,12 +28,12 @@ pub trait Board {
     /// Clock of the PWM's timer, Hz. A scenario whose `servo.timer_clock_hz` is another is refused: its carrier and all its
     /// times would be off by the ratio.
     const TIMER_CLOCK_HZ: u32;
-    /// Counts a second of [`cost_counter`](Self::cost_counter).
+    /// Counts per second of [`cost_counter`](Self::cost_counter).
     const COST_CLOCK_HZ: u32;
-    /// Instructions a second that the core executes, where it is simulated to execute that many; 0 on silicon.
+    /// Instructions per second of a simulated core; 0 on silicon.
     const INSTRUCTION_RATE_HZ: u32;
 
-    /// Starts the PWM with a period of `period` counts at the neutral duty, and calls the SysTick exception once a period.
+    /// Starts the PWM with a period of `period` counts at the neutral duty, and calls the SysTick exception once per period.
     ///
     /// # Errors
     /// If the period does not fit the timer, or the PWM is started already.
@@ -69,12 +69,12 @@ pub trait Board {
     /// The next byte from it, if there is one.
     fn uart_receive() -> Option<u8>;
 
-    /// Passes time until there may be something to do.
+    /// Waits until there may be work to do.
     fn idle() {
         cortex_m::asm::wfi();
     }
 }
 
-/// Why a board cannot start its PWM.
+/// The board cannot start its PWM.
 #[derive(Debug, Clone, Copy)]
 pub struct BoardError;

@@ -1,6 +1,6 @@
 //! The task at the control rate: frame, controller, gate.
 
-use super::duplex::Duplex;
+use super::dual_channel::DualChannel;
 use crate::controller::{Command, Controller};
 use crate::e2e::{Receiver, Sender, Status};
 use crate::exchange::FrameBytes;
@@ -8,59 +8,42 @@ use crate::frame::{
     ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_measurement, encode_actuation,
 };
 use crate::gate::{Fault, Faults, Observation, Setpoint, Supervisor};
+use crate::listed;
 use crate::signal::{Actuation, Measurement};
 use crate::{Real, Scenario};
 
-/// An event that is detected and tolerated. The number is its bit in a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Warning {
-    /// A sensor frame did not come.
-    FrameMissing = 0,
-    /// A sensor frame was damaged, or another frame in its place.
-    FrameDamaged = 1,
-    /// A sensor frame came twice.
-    FrameRepeated = 2,
-    /// A sensor frame came out of sequence.
-    FrameSequence = 3,
-    /// Sensor frames before this one were lost.
-    FramesLost = 4,
+listed! {
+    /// An event that is detected and tolerated. The number is its bit in a frame.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum Warning {
+        /// A sensor frame is missing.
+        FrameMissing = 0 => "frame missing",
+        /// A sensor frame was damaged, or another frame in its place.
+        FrameDamaged = 1 => "frame damaged",
+        /// A sensor frame came twice.
+        FrameRepeated = 2 => "frame repeated",
+        /// A sensor frame came out of sequence.
+        FrameSequence = 3 => "frame sequence",
+        /// Sensor frames before this one were lost.
+        FramesLost = 4 => "frames lost",
+    }
 }
 
 impl Warning {
-    /// All warnings.
-    pub const ALL: [Self; 5] = [
-        Self::FrameMissing,
-        Self::FrameDamaged,
-        Self::FrameRepeated,
-        Self::FrameSequence,
-        Self::FramesLost,
-    ];
-
     fn bit(self) -> u16 {
         1 << self as u16
     }
-
-    /// Its name, for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::FrameMissing => "frame missing",
-            Self::FrameDamaged => "frame damaged",
-            Self::FrameRepeated => "frame repeated",
-            Self::FrameSequence => "frame sequence",
-            Self::FramesLost => "frames lost",
-        }
-    }
 }
 
-/// What a control tick works on.
+/// Input of a control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlInput {
     /// The sensor frame that came since the last tick.
     pub frame: Option<FrameBytes>,
     /// Counts of the independent clock since the last tick.
     pub elapsed_counts: u32,
-    /// What the PWM task has found.
+    /// Faults found by the PWM task.
     pub found_by_pwm: Faults,
 }
 
@@ -73,14 +56,14 @@ impl ControlInput {
     };
 }
 
-/// What a control tick gives.
+/// Output of a control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControlOutput<T> {
     /// For the PWM task, one a channel.
     pub setpoints: [Setpoint<T>; 2],
     /// The actuator frame.
     pub frame: FrameBytes,
-    /// What the frame says.
+    /// Content of the frame.
     pub actuation: Actuation<T>,
 }
 
@@ -131,20 +114,20 @@ impl<T: Real> Channel<T> {
         (setpoint, actuation)
     }
 
-    /// The actuator frame. The safe state judges nothing any more, so a wheel speed limit that memory lost in one channel
-    /// must not be told: it is the lower of both channels'.
-    fn tell(&mut self, told: &Actuation<T>, other: &Actuation<T>) -> (Actuation<T>, FrameBytes) {
-        let limit_rpm = lower(told.wheel_speed_limit_rpm, other.wheel_speed_limit_rpm);
+    /// The actuator frame. The safe state makes no further checks, so a wheel speed limit corrupted in one channel must not
+    /// be reported: the limit is the lower of both channels'.
+    fn report(&mut self, own: &Actuation<T>, other: &Actuation<T>) -> (Actuation<T>, FrameBytes) {
+        let limit_rpm = lower(own.wheel_speed_limit_rpm, other.wheel_speed_limit_rpm);
         let actuation = Actuation {
             wheel_speed_limit_rpm: limit_rpm,
-            ..*told
+            ..*own
         };
         let signals = actuation.map(&|signal: T| signal.to_f64() as f32);
         (actuation, encode_actuation(&signals, &mut self.sender))
     }
 }
 
-/// The bit of what was tolerated.
+/// The bit of the tolerated event.
 fn warnings(status: Status) -> u16 {
     match status {
         Status::Ok => 0,
@@ -159,14 +142,14 @@ fn warnings(status: Status) -> u16 {
 /// The task at the control rate.
 #[derive(Debug, Clone)]
 pub struct ControlTask<T> {
-    channels: Duplex<Channel<T>>,
+    channels: DualChannel<Channel<T>>,
     frames_differed: bool,
 }
 
 impl<T: Real> ControlTask<T> {
     pub(super) fn new(scenario: &Scenario<T>, clock_hz: u32) -> Self {
         Self {
-            channels: Duplex::new(Channel {
+            channels: DualChannel::new(Channel {
                 receiver: Receiver::new(SENSOR_DATA_ID, MAX_DELTA_COUNTER),
                 counter: u8::MAX,
                 measurement: None,
@@ -184,12 +167,12 @@ impl<T: Real> ControlTask<T> {
         let channels_differ = self.frames_differed || !self.channels.agrees();
         found_outside.add_if(channels_differ, Fault::ChannelsDiffer);
         let [a, b] = self.channels.both();
-        let (setpoint_a, told_a) = a.run(input, found_outside);
-        let (setpoint_b, told_b) = b.run(input, found_outside);
-        let pairs = [(told_a, told_b), (told_b, told_a)];
+        let (setpoint_a, actuation_a) = a.run(input, found_outside);
+        let (setpoint_b, actuation_b) = b.run(input, found_outside);
+        let pairs = [(actuation_a, actuation_b), (actuation_b, actuation_a)];
         let [(actuation, frame), (_, other_frame)] = self
             .channels
-            .run_each(&pairs, |channel, (own, other)| channel.tell(own, other));
+            .run_each(&pairs, |channel, (own, other)| channel.report(own, other));
         self.frames_differed = differ(&frame, &other_frame);
         ControlOutput {
             setpoints: [setpoint_a, setpoint_b],
@@ -214,9 +197,9 @@ fn lower<T: Real>(a: T, b: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::controller::Policy;
     use crate::gate::Limits;
     use crate::parameter::ParameterSet;
+    use crate::policy::Policy;
     use crate::signal::Mode;
 
     const CLOCK_HZ: u32 = 25_000_000;
@@ -262,7 +245,7 @@ mod tests {
         {
             for bit in 0..32 {
                 let mut scenario = Scenario::reconstruction();
-                flip((field.place)(&mut scenario.gate), bit);
+                flip((field.accessor)(&mut scenario.gate), bit);
                 let supervisor = Supervisor::new(&scenario, CLOCK_HZ);
                 let task = damaged(channel, |one| one.supervisor = supervisor);
                 assert_found(task, field.name, bit);
@@ -278,7 +261,7 @@ mod tests {
         {
             for bit in 0..32 {
                 let mut scenario = Scenario::reconstruction();
-                flip((field.place)(&mut scenario.policy), bit);
+                flip((field.accessor)(&mut scenario.policy), bit);
                 let controller = Controller::new(&scenario);
                 let task = damaged(channel, |one| one.controller = controller);
                 assert_found(task, field.name, bit);
@@ -286,7 +269,7 @@ mod tests {
         }
     }
 
-    /// A flip may strike what a frame is made of and leave both channels equal, so it is the frames that tell.
+    /// A flipped bit may change a frame's content and leave both channels equal: only the frames differ.
     #[test]
     fn frames_that_differ_are_found_in_the_next_tick() {
         for channel in [0, 1] {
@@ -322,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lower_speed_limit_of_one_channel_is_told() {
+    fn a_lower_speed_limit_of_one_channel_is_reported() {
         for channel in [0, 1] {
             let mut scenario = Scenario::reconstruction();
             scenario.gate.safe_wheel_speed_rpm = 500.0;

@@ -1,13 +1,13 @@
 //! The task at the PWM rate: dither, gate, duty.
 
 use super::control::ControlOutput;
-use super::duplex::Duplex;
+use super::dual_channel::DualChannel;
 use crate::dither::Oscillator;
 use crate::gate::{Fault, Faults, Limiter, Setpoint};
 use crate::servo::{Duty, Pwm};
 use crate::{Real, Scenario};
 
-/// What the PWM task hands out at the start of a period.
+/// Output of the PWM task at the start of a period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PwmPeriod {
     /// Duty of the period.
@@ -22,12 +22,12 @@ struct Channel<T> {
     limiter: Limiter<T>,
     pwm: Pwm<T>,
     setpoint: Setpoint<T>,
-    periods_a_tick: u32,
+    periods_per_tick: u32,
     periods_to_tick: u32,
 }
 
 impl<T: Real> Channel<T> {
-    // Twice in line: what it gives stays in registers.
+    // In line, twice: its results stay in registers.
     #[inline(always)]
     fn begin(&mut self) -> PwmPeriod {
         let sample: T = self.oscillator.sample();
@@ -35,7 +35,7 @@ impl<T: Real> Channel<T> {
         let duty = self.pwm.duty(self.limiter.run(&self.setpoint, dither_v));
         let control_due = self.periods_to_tick <= 1;
         self.periods_to_tick = if control_due {
-            self.periods_a_tick
+            self.periods_per_tick
         } else {
             self.periods_to_tick - 1
         };
@@ -46,7 +46,7 @@ impl<T: Real> Channel<T> {
 /// The task at the PWM rate.
 #[derive(Debug, Clone)]
 pub struct PwmTask<T> {
-    channels: Duplex<Channel<T>>,
+    channels: DualChannel<Channel<T>>,
     neutral: Duty,
     faults: Faults,
 }
@@ -57,15 +57,15 @@ impl<T: Real> PwmTask<T> {
         let run = &scenario.run;
         let pwm = Pwm::new(&scenario.servo, run.pwm_rate_hz);
         let neutral = pwm.neutral();
-        let periods_a_tick = scenario.periods_per_tick();
+        let periods_per_tick = scenario.periods_per_tick();
         Self {
-            channels: Duplex::new(Channel {
+            channels: DualChannel::new(Channel {
                 oscillator: Oscillator::new(&scenario.dither, run.pwm_rate_hz),
                 limiter: Limiter::new(scenario, neutral.code()),
                 pwm,
                 setpoint: Setpoint::neutral(),
-                periods_a_tick,
-                periods_to_tick: periods_a_tick,
+                periods_per_tick,
+                periods_to_tick: periods_per_tick,
             }),
             neutral,
             faults: Faults::NONE,
@@ -77,7 +77,8 @@ impl<T: Real> PwmTask<T> {
         let [a, b] = self.channels.both();
         let (a, b) = (a.begin(), b.begin());
         self.faults.add_if(a != b, Fault::ChannelsDiffer);
-        // Where the channels differ: of the two the duty nearer to neutral, and neutral itself if they lie on both sides of it.
+        // Where the channels differ: of the two the duty nearer to neutral, and neutral itself if they lie on both sides
+        // of it.
         let duty = self.neutral.median(a.duty, b.duty);
         self.channels
             .run(|channel| channel.limiter.expect(duty.code()));
@@ -95,7 +96,7 @@ impl<T: Real> PwmTask<T> {
             });
     }
 
-    /// The control task was not done when due again.
+    /// Reports that the control task was not finished when due again.
     pub fn report_late_control(&mut self) {
         self.faults |= Fault::ControlLate;
     }
@@ -106,7 +107,7 @@ impl<T: Real> PwmTask<T> {
             .run(|channel| channel.limiter.observe(captured_code));
     }
 
-    /// Everything found since the start; compares the channels in full.
+    /// All faults found since the start; compares the channels in full.
     // Out of line: nine periods in ten go without it.
     #[inline(never)]
     pub fn faults(&mut self) -> Faults {
@@ -140,7 +141,7 @@ mod tests {
         scenario
     }
 
-    /// A task at work, with damage to one channel.
+    /// A running task with one channel damaged.
     fn damaged(channel: usize, damage: impl Fn(&mut Channel<f32>)) -> PwmTask<f32> {
         let mut task = PwmTask::new(&scenario());
         let mut place = 0;
@@ -154,7 +155,7 @@ mod tests {
         task
     }
 
-    /// What goes out meanwhile is neutral, the right duty, or between them, and no control tick comes late.
+    /// Until then the duty is neutral, the right one, or between them, and no control tick is late.
     fn assert_found(damage: impl Fn(&mut Channel<f32>), what: &str) {
         for channel in [0, 1] {
             let mut right = damaged(2, |_| {});
@@ -193,7 +194,7 @@ mod tests {
                 |one| one.setpoint.dither_amplitude_v = flip(0.1),
                 "amplitude",
             );
-            assert_found(|one| one.periods_a_tick ^= 1 << bit, "periods in a tick");
+            assert_found(|one| one.periods_per_tick ^= 1 << bit, "periods per tick");
             assert_found(|one| one.periods_to_tick ^= 1 << bit, "periods to the tick");
         }
     }

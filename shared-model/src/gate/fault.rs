@@ -1,86 +1,45 @@
-//! What the gate can find, as bits of a frame.
+//! Faults that the gate detects, as bits of a frame.
 
+use crate::listed;
 use core::ops::BitOrAssign;
 
-/// A fault that puts the ECU into its safe state. The number is its bit in a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Fault {
-    /// A measured signal is NaN, infinite or subnormal: no sensor gives such a number.
-    SensorNotANumber = 0,
-    /// A measured signal is outside its range.
-    SensorRange = 1,
-    /// A measured signal changes faster than it can.
-    SensorRate = 2,
-    /// The yaw rate does not move while the steering does.
-    SensorStuck = 3,
-    /// Steering angle and steering rate contradict each other.
-    SteeringInconsistent = 4,
-    /// Wheel speed times yaw rate is more lateral acceleration than the road can give.
-    LateralAcceleration = 5,
-    /// No valid sensor frame for too long.
-    FrameAge = 6,
-    /// Too little or too much time between two control ticks, by an independent clock.
-    TickWindow = 7,
-    /// A control tick was not done when the next was due.
-    ControlLate = 8,
-    /// The controller's command is not a finite number.
-    CommandNotANumber = 9,
-    /// The motor's share of the voltage is above its limit.
-    MotorVoltage = 10,
-    /// The motor's share of the voltage changes faster than allowed.
-    MotorSlew = 11,
-    /// The dither is stronger than its amplitude, or the amplitude is above its limit.
-    DitherAmplitude = 12,
-    /// The dither is slower or faster than allowed.
-    DitherFrequency = 13,
-    /// The duty on the servo's pin is not the one that was put out.
-    Readback = 14,
-    /// The program's two channels differ: memory was changed.
-    ChannelsDiffer = 15,
-}
-
-impl Fault {
-    /// All faults.
-    pub const ALL: [Self; 16] = [
-        Self::SensorNotANumber,
-        Self::SensorRange,
-        Self::SensorRate,
-        Self::SensorStuck,
-        Self::SteeringInconsistent,
-        Self::LateralAcceleration,
-        Self::FrameAge,
-        Self::TickWindow,
-        Self::ControlLate,
-        Self::CommandNotANumber,
-        Self::MotorVoltage,
-        Self::MotorSlew,
-        Self::DitherAmplitude,
-        Self::DitherFrequency,
-        Self::Readback,
-        Self::ChannelsDiffer,
-    ];
-
-    /// Its name, for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::SensorNotANumber => "sensor not a number",
-            Self::SensorRange => "sensor range",
-            Self::SensorRate => "sensor rate",
-            Self::SensorStuck => "sensor stuck",
-            Self::SteeringInconsistent => "steering inconsistent",
-            Self::LateralAcceleration => "lateral acceleration",
-            Self::FrameAge => "frame age",
-            Self::TickWindow => "tick window",
-            Self::ControlLate => "control late",
-            Self::CommandNotANumber => "command not a number",
-            Self::MotorVoltage => "motor voltage",
-            Self::MotorSlew => "motor slew",
-            Self::DitherAmplitude => "dither amplitude",
-            Self::DitherFrequency => "dither frequency",
-            Self::Readback => "readback",
-            Self::ChannelsDiffer => "channels differ",
-        }
+listed! {
+    /// A fault that puts the ECU into its safe state. The number is its bit in a frame.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    #[repr(u8)]
+    pub enum Fault {
+        /// A measured signal is NaN, infinite or subnormal: no sensor gives such a number.
+        SensorNotANumber = 0 => "sensor not a number",
+        /// A measured signal is outside its range.
+        SensorRange = 1 => "sensor range",
+        /// A measured signal changes faster than it can.
+        SensorRate = 2 => "sensor rate",
+        /// The yaw rate does not move while the steering does.
+        SensorStuck = 3 => "sensor stuck",
+        /// Steering angle and steering rate contradict each other.
+        SteeringInconsistent = 4 => "steering inconsistent",
+        /// Wheel speed times yaw rate is more lateral acceleration than the road can give.
+        LateralAcceleration = 5 => "lateral acceleration",
+        /// The last valid sensor frame is too old.
+        FrameAge = 6 => "frame age",
+        /// The time between two control ticks, by an independent clock, is outside its window.
+        TickWindow = 7 => "tick window",
+        /// A control tick was not finished when the next was due.
+        ControlLate = 8 => "control late",
+        /// The controller's command is not a finite number.
+        CommandNotANumber = 9 => "command not a number",
+        /// The motor's share of the voltage is above its limit.
+        MotorVoltage = 10 => "motor voltage",
+        /// The motor's share of the voltage changes faster than allowed.
+        MotorSlew = 11 => "motor slew",
+        /// The dither is stronger than its amplitude, or the amplitude is above its limit.
+        DitherAmplitude = 12 => "dither amplitude",
+        /// The dither is slower or faster than allowed.
+        DitherFrequency = 13 => "dither frequency",
+        /// The duty on the servo's pin differs from the commanded one.
+        Readback = 14 => "readback",
+        /// The program's two channels differ, which indicates memory corruption.
+        ChannelsDiffer = 15 => "channels differ",
     }
 }
 

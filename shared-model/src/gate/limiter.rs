@@ -8,7 +8,7 @@ use crate::scenario::Scenario;
 /// Periods in a row in which the pin may show another duty: a capture that fell onto an edge.
 const READBACK_TOLERANCE: u32 = 1;
 
-/// The half period of the dither that goes on.
+/// The present half period of the dither.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct HalfPeriod {
     is_positive: bool,
@@ -19,8 +19,8 @@ struct HalfPeriod {
 
 /// The gate at the PWM rate.
 ///
-/// The frequency is judged by the whole number of samples in each half period, so it is known to one sample in that: at 10 kHz
-/// a limit of 5000 rad/s (6.28 samples) is found crossed from 5240 rad/s (6 samples) on.
+/// The frequency is judged by the whole number of samples in each half period, so it is known to one sample in that: at
+/// 10 kHz a limit of 5000 rad/s (6.28 samples) is found exceeded from 5240 rad/s (6 samples) upwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limiter<T> {
     /// Least and most samples in half a period of the dither.
@@ -55,7 +55,8 @@ impl<T: Real> Limiter<T> {
         }
     }
 
-    /// Servo voltage of a PWM period: the motor's share and the dither's sample, the latter only if it is within its amplitude.
+    /// Servo voltage of a PWM period: the motor's share and the dither's sample, the latter only if it is within its
+    /// amplitude.
     pub fn run(&mut self, setpoint: &Setpoint<T>, dither_v: T) -> T {
         let amplitude_v = setpoint.dither_amplitude_v;
         // False for NaN.
@@ -77,7 +78,7 @@ impl<T: Real> Limiter<T> {
             samples: 0,
             is_whole: false,
         });
-        // Nearer to zero a sample's sign may be its error's.
+        // Closer to zero the sign of a sample may be that of its error.
         let sure_v = amplitude_v * self.sample_error;
         let has_changed = if now.is_positive {
             dither_v < -sure_v
@@ -115,7 +116,7 @@ impl<T: Real> Limiter<T> {
             .add_if(self.mismatches > READBACK_TOLERANCE, Fault::Readback);
     }
 
-    /// Everything found since the start.
+    /// All faults found since the start.
     pub fn faults(&self) -> Faults {
         self.faults
     }

@@ -1,9 +1,9 @@
 //! The command gate: independent limits on every command, and the safe state. It shares no code with the controller that it
 //! guards.
 //!
-//! At the control rate a [`Supervisor`] judges sensors, time and the controller's command; at the PWM rate a [`Limiter`] judges
-//! each sample of the dither and the duty seen on the servo's pin. Any fault latches the safe state until restart: the dither
-//! is ramped out, the motor's share slews to zero, and the vehicle is asked to slow down.
+//! At the control rate a [`Supervisor`] judges sensors, time and the controller's command; at the PWM rate a [`Limiter`]
+//! judges each sample of the dither and the duty seen on the servo's pin. Any fault latches the safe state until restart:
+//! the dither is ramped out, the motor's share slews to zero, and a lower wheel speed is demanded.
 
 mod fault;
 mod limiter;
@@ -19,7 +19,7 @@ pub use supervisor::{Observation, Supervisor};
 
 use crate::Real;
 
-/// What may be put on the servo until the next control tick.
+/// Setpoint of the servo until the next control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setpoint<T> {
     /// Motor's share of the voltage, V.

@@ -1,10 +1,10 @@
-//! Are the measured signals possible?
+//! Plausibility of the measured signals.
 
 use super::{Fault, Faults, Limits};
 use crate::Real;
 use crate::signal::Measurement;
 
-/// Watches the measurements.
+/// The plausibility check of the measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plausibility<T> {
     limits: Limits<T>,
@@ -16,7 +16,7 @@ pub struct Plausibility<T> {
     ticks: T,
     /// Steering angle's change less the integral of the steering rate, forgotten exponentially, rad.
     contradiction_rad: T,
-    /// How far the steering is from where it was when the yaw rate last changed, rad.
+    /// Movement of the steering since the yaw rate last changed, rad.
     unanswered_steering_rad: T,
 }
 
@@ -34,18 +34,18 @@ impl<T: Real> Plausibility<T> {
         }
     }
 
-    /// The limits that it holds measurements against, and all others.
+    /// All limits of the gate.
     pub fn limits(&self) -> &Limits<T> {
         &self.limits
     }
 
-    /// A control tick; `measurement` is new, or `None` if there was none. Returns what is wrong with it.
+    /// A control tick; `measurement` is new, or `None` if there was none. Returns the faults found.
     pub fn check(&mut self, measurement: Option<&Measurement<T>>) -> Faults {
         self.ticks += T::one();
         let Some(now) = measurement else {
             return Faults::NONE;
         };
-        // Of what is not a number nothing else can be said.
+        // No further check applies to a signal that is not a number.
         if !signals(now).into_iter().all(is_a_number) {
             return Fault::SensorNotANumber.into();
         }

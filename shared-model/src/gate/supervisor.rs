@@ -10,24 +10,24 @@ use crate::signal::{Measurement, Mode};
 /// Rounding that a command may have beyond a limit, as a share of the greatest command.
 const ROUNDING: f64 = 1e-6;
 
-/// What the gate sees at a control tick.
+/// Input of the gate at a control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation<T> {
     /// Counts of the independent clock since the last control tick.
     pub elapsed_counts: u32,
     /// The measurement, if a valid frame brought a new one.
     pub measurement: Option<Measurement<T>>,
-    /// What the controller asks for: the motor's share of the voltage, V.
+    /// The controller's command: the motor's share of the voltage, V.
     pub motor_v: T,
-    /// What the controller asks for: the dither's amplitude, V.
+    /// The controller's command: the dither's amplitude, V.
     pub dither_amplitude_v: T,
-    /// Found outside: by the gate at the PWM rate, or by comparing the program's channels.
+    /// Faults found elsewhere: by the gate at the PWM rate, or by comparing the program's channels.
     pub found_outside: Faults,
 }
 
-/// Greatest magnitudes of a command.
+/// Greatest magnitudes of a command, rounding included.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Most<T> {
+struct CommandLimits<T> {
     motor_v: T,
     /// Change of the motor's share in a control tick.
     motor_change_v: T,
@@ -38,11 +38,10 @@ struct Most<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervisor<T> {
     plausibility: Plausibility<T>,
-    /// What a command may be at most, rounding included.
-    most: Most<T>,
+    command_limits: CommandLimits<T>,
     /// Change of the motor's share in a control tick of the safe state, V.
     slew_v: T,
-    /// What the safe state takes from the amplitude in a control tick, V.
+    /// Decrease of the amplitude in a control tick of the safe state, V.
     ramp_v: T,
     /// Least and most counts of the clock in a control tick.
     window_counts: (u32, u32),
@@ -54,7 +53,7 @@ pub struct Supervisor<T> {
 }
 
 impl<T: Real> Supervisor<T> {
-    /// The gate of a scenario, whose clock counts `clock_hz` a second.
+    /// The gate of a scenario, whose clock runs at `clock_hz`.
     pub fn new(scenario: &Scenario<T>, clock_hz: u32) -> Self {
         let limits = scenario.gate;
         let period_s = T::one() / scenario.run.control_rate_hz;
@@ -70,7 +69,7 @@ impl<T: Real> Supervisor<T> {
         let tolerance = limits.tick_tolerance * counts;
         Self {
             plausibility: Plausibility::new(&limits, period_s, speed_per_rpm),
-            most: Most {
+            command_limits: CommandLimits {
                 motor_v: limits.motor_voltage_v * (T::one() + rounding),
                 motor_change_v: slew_v + rounding * limits.motor_voltage_v,
                 dither_amplitude_v: amplitude_limit_v * (T::one() + rounding),
@@ -87,9 +86,9 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// A control tick: judges what was observed, and lets through what is within the limits.
+    /// A control tick: judges the observation, and passes a command within the limits.
     pub fn run(&mut self, seen: &Observation<T>) -> Setpoint<T> {
-        // What follows a fault is its consequence, and says nothing new.
+        // Findings after a fault are its consequences.
         if self.mode != Mode::Safe {
             let found = self.judge(seen);
             self.faults |= found;
@@ -120,7 +119,7 @@ impl<T: Real> Supervisor<T> {
         let mut faults = seen.found_outside;
         faults |= self.plausibility.check(seen.measurement.as_ref());
         faults |= self.command_faults(seen);
-        // Nobody knows how long ago the last tick or frame was before the first, and until then the servo is neutral.
+        // Before the first frame the times since the last tick and frame are undefined; until then the servo is neutral.
         if self.mode == Mode::Starting {
             return faults;
         }
@@ -141,12 +140,12 @@ impl<T: Real> Supervisor<T> {
         if !(motor_v.is_finite() && amplitude_v.is_finite()) {
             return Fault::CommandNotANumber.into();
         }
-        let most = &self.most;
+        let limits = &self.command_limits;
         let change_v = motor_v - self.setpoint.motor_v;
-        let is_amplitude = amplitude_v >= T::zero() && amplitude_v <= most.dither_amplitude_v;
+        let is_amplitude = amplitude_v >= T::zero() && amplitude_v <= limits.dither_amplitude_v;
         let mut faults = Faults::NONE;
-        faults.add_if(motor_v.abs() > most.motor_v, Fault::MotorVoltage);
-        faults.add_if(change_v.abs() > most.motor_change_v, Fault::MotorSlew);
+        faults.add_if(motor_v.abs() > limits.motor_v, Fault::MotorVoltage);
+        faults.add_if(change_v.abs() > limits.motor_change_v, Fault::MotorSlew);
         faults.add_if(!is_amplitude, Fault::DitherAmplitude);
         faults
     }
@@ -169,12 +168,12 @@ impl<T: Real> Supervisor<T> {
         }
     }
 
-    /// What the ECU is doing.
+    /// The ECU's operating mode.
     pub fn mode(&self) -> Mode {
         self.mode
     }
 
-    /// What put the ECU into its safe state.
+    /// The faults that caused the safe state.
     pub fn faults(&self) -> Faults {
         self.faults
     }

@@ -1,9 +1,9 @@
 //! `sim-host config`: the complete configuration.
 
 use super::{ConfigOptions, Done};
-use dynamics::config::{to_toml, validate};
+use dynamics::config::{to_commented_toml, validate};
 
-/// Print a complete configuration as TOML, checked. Names carry their units.
+/// Print a complete configuration as TOML, checked. Names carry their units; comments show the allowed values.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host config > vehicle.toml        # the paper's vehicle, to be edited
@@ -17,6 +17,6 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
-    say!("{}", to_toml(&scenario).trim_end());
+    say!("{}", to_commented_toml(&scenario).trim_end());
     Ok(Done::Well)
 }

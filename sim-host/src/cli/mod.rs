@@ -299,13 +299,8 @@ impl RunOptions {
 }
 
 fn waveform(name: &str) -> Result<Waveform, String> {
-    let names = || {
-        Waveform::ALL
-            .iter()
-            .map(|&(name, _)| name)
-            .collect::<Vec<_>>()
-    };
-    Waveform::from_name(name).ok_or_else(|| format!("must be one of {}", names().join(", ")))
+    let names = || Waveform::ALL.map(Waveform::name).join(", ");
+    Waveform::from_name(name).ok_or_else(|| format!("must be one of {}", names()))
 }
 
 /// Least and greatest time-out, s.

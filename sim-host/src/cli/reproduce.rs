@@ -4,7 +4,6 @@ use super::Done;
 use super::output::{check, named};
 use dynamics::config::validate;
 use indicatif::{ProgressBar, ProgressStyle};
-use shared_model::settings::Choice;
 use shared_model::{Preset, Scenario};
 use sim_host::reproduce::{CLAIMS, Judgement, Options, Progress, Quality, Summary, reproduce};
 use std::path::PathBuf;
@@ -131,9 +130,9 @@ fn scenarios(arguments: &Arguments) -> anyhow::Result<Vec<(String, Scenario<f64>
         };
         return Ok(vec![(stem.chars().map(plain).collect(), scenario)]);
     }
-    let presets = Preset::ALL.iter();
+    let presets = Preset::ALL.into_iter();
     Ok(presets
-        .map(|&(name, preset)| (name.into(), Scenario::preset(preset)))
+        .map(|preset| (preset.name().into(), Scenario::preset(preset)))
         .collect())
 }
 

@@ -248,7 +248,7 @@ pub(super) fn load(id: String, instructions: &Instructions) -> Check {
 /// How far the spacing of PWM interrupts strays, by a timer that is not their clock.
 fn jitter(outcome: &Outcome) -> Check {
     let (header, trailer) = (&outcome.recording.header, &outcome.recording.trailer);
-    let (least, most) = (trailer.least_spacing, trailer.most_spacing);
+    let (least, most) = (trailer.min_interval, trailer.max_interval);
     let spread = f64::from(most) - f64::from(least);
     let period = f64::from(header.cost_clock_hz)
         / (f64::from(header.step_rate_hz) * f64::from(header.samples_per_step));

@@ -1,7 +1,6 @@
 //! `cargo xtask coverage`: every line of the gate is run by a test of the model.
 
 use std::collections::BTreeMap;
-use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -57,21 +56,20 @@ fn run_tests(pinned: &str, folder: &Path, profiles: &Path) -> Result<()> {
 impl Llvm {
     fn of(pinned: &str) -> Result<Self> {
         let about = process::capture(rustup::tool(pinned, "rustc")?.arg("-vV"));
-        let about = about.context("rustc does not tell its version")?;
+        let about = about.context("rustc does not report its version")?;
         let value = |key: &str| about.lines().find_map(|line| line.strip_prefix(key));
         let major = value("LLVM version: ").and_then(|version| version.split('.').next());
-        let major = major.context("rustc does not tell its LLVM's version")?;
-        let host = value("host: ").context("rustc does not tell its host")?;
+        let major = major.context("rustc does not report its LLVM's version")?;
+        let host = value("host: ").context("rustc does not report its host")?;
         let component = rustup::folder(pinned)?
             .join("lib/rustlib")
             .join(host)
             .join("bin");
         let package = PathBuf::from(format!("/usr/lib/llvm-{major}/bin"));
         for folder in [component, package] {
-            let program = |name| folder.join(format!("{name}{}", env::consts::EXE_SUFFIX));
             let found = Self {
-                profdata: program("llvm-profdata"),
-                cov: program("llvm-cov"),
+                profdata: folder.join("llvm-profdata"),
+                cov: folder.join("llvm-cov"),
             };
             if found.profdata.is_file() && found.cov.is_file() {
                 return Ok(found);
@@ -100,7 +98,7 @@ impl Llvm {
         }
         let sources = COVERED.map(|source| workspace::root().join(source));
         export.arg("--sources").args(sources);
-        process::capture(&mut export).context("llvm-cov does not read what the tests counted")
+        process::capture(&mut export).context("llvm-cov does not read the tests' counts")
     }
 }
 
@@ -108,8 +106,8 @@ impl Llvm {
 fn test_programs(pinned: &str, folder: &Path, profiles: &Path) -> Result<Vec<String>> {
     let mut cargo = cargo(pinned, folder, profiles)?;
     let output = cargo.arg("--no-run").output()?;
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let named = said
+    let messages = String::from_utf8_lossy(&output.stderr).into_owned();
+    let named = messages
         .lines()
         .filter(|line| line.trim_start().starts_with("Executable"));
     let programs = named.filter_map(|line| Some(line.split_once('(')?.1.strip_suffix(')')?.into()));

@@ -34,7 +34,9 @@ fn verify(args: &[String]) -> Result<()> {
     match status.code() {
         Some(0) => Ok(()),
         Some(code) => {
-            let why = format!("sim-host ended with exit code {code}; its own last line says why");
+            let why = format!(
+                "sim-host ended with exit code {code}; its last line of output has the reason"
+            );
             Err(Exit::with_code(u8::try_from(code)?, why).into())
         }
         None => bail!("sim-host was stopped: {status}"),

@@ -21,7 +21,7 @@ pub fn run(board: &str) -> Result<()> {
     let toolchain = toolchain.with_context(|| {
         format!(
             "{} is missing: run `cargo xtask setup`",
-            setup::target::TARGET
+            setup::probe::TARGET
         )
     })?;
     for board in &chosen {

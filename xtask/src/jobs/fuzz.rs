@@ -9,8 +9,8 @@ use super::stage;
 use crate::outcome::Exit;
 use crate::{process, rustup, workspace};
 
-/// The readers (`fuzz/src/lib.rs`), and how many inputs each is given unless told otherwise: ten million where one takes
-/// microseconds, as many as take some ten minutes where it takes longer.
+/// The readers (`fuzz/src/lib.rs`), and the default number of inputs of each: ten million where one takes
+/// microseconds, the number for some ten minutes where it takes longer.
 const TARGETS: [(&str, u64); 12] = [
     ("telemetry", 10_000_000),
     ("recording", 1_000_000),
@@ -57,9 +57,9 @@ pub fn run(target: Option<&str>, inputs: Option<u64>) -> Result<()> {
 
 fn build(pinned: &str, folder: &Path) -> Result<PathBuf> {
     let about = process::capture(rustup::tool(pinned, "rustc")?.arg("-vV"));
-    let about = about.context("rustc does not tell its host")?;
+    let about = about.context("rustc does not report its host")?;
     let host = about.lines().find_map(|line| line.strip_prefix("host: "));
-    let host = host.context("rustc does not tell its host")?;
+    let host = host.context("rustc does not report its host")?;
     let mut cargo = rustup::cargo(pinned)?;
     // With a target named, the flags are not those of build scripts and macros.
     cargo

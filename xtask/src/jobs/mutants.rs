@@ -1,4 +1,4 @@
-//! `cargo xtask mutants`: does a test notice when gate, controller or ECU program are changed?
+//! `cargo xtask mutants`: mutation tests of gate, controller and ECU program.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,21 +13,21 @@ use crate::{process, rustup, workspace};
 /// The tool, in the version whose mutations [`SURVIVORS`] names.
 const TOOL: &str = "cargo-mutants";
 const VERSION: &str = "27.1.0";
-/// What is mutated.
+/// The files to mutate.
 const MUTATED: [&str; 4] = [
     "shared-model/src/gate/*.rs",
     "shared-model/src/controller.rs",
     "shared-model/src/ecu.rs",
     "shared-model/src/ecu/*.rs",
 ];
-/// The tests that have to notice, beside those inside the library.
+/// The tests that have to fail, beside those inside the library.
 const TESTS: [&str; 5] = ["controller", "ecu", "gate", "limiter", "plausibility"];
-/// The mutations that no test can notice, each below its reason.
+/// The mutations that no test can detect, each below its reason.
 const SURVIVORS: &str = "shared-model/mutants-survivors.txt";
-/// What the tool ends with: all caught, some missed, some ran into the time limit.
+/// Exit codes of the tool: all caught, some missed, some ran into the time limit.
 const JUDGED: [i32; 3] = [0, 2, 3];
 
-/// Mutates, tests, and holds what survives against the list of those with a reason.
+/// Mutates, tests, and compares the survivors with the list of those with a reason.
 pub fn run() -> Result<()> {
     let pinned = rustup::require_pinned()?;
     let tools = workspace::target_dir()?.join("tools");
@@ -53,8 +53,7 @@ pub fn run() -> Result<()> {
 }
 
 fn program(tools: &Path) -> PathBuf {
-    let name = format!("{TOOL}{}", std::env::consts::EXE_SUFFIX);
-    tools.join("bin").join(name)
+    tools.join("bin").join(TOOL)
 }
 
 fn ensure(pinned: &str, tools: &Path) -> Result<()> {
@@ -152,7 +151,7 @@ fn without_place(line: &str) -> String {
     }
 }
 
-/// What is in `lines` more often than in `others`.
+/// The elements that occur in `lines` more often than in `others`.
 fn without(lines: &[String], others: &[String]) -> Vec<String> {
     let mut left = others.to_vec();
     let mut is_new = |line: &&String| match left.iter().position(|other| other == *line) {

@@ -1,4 +1,4 @@
-//! `cargo xtask proofs`: what is proved of the firmware.
+//! `cargo xtask proofs`: proofs about the firmware.
 
 use anyhow::{Context, Result};
 
@@ -6,7 +6,7 @@ use super::stage;
 use crate::outcome::Exit;
 use crate::{firmware, process, rustup, setup, workspace};
 
-/// What the linker misses where a panic can be reached.
+/// The undefined function that the linker reports where a panic is reachable.
 const MISSING_FUNCTION: &str = "a_panic_is_reachable_from_the_control_path";
 /// The tests that compare with tests/golden.
 const TESTS: [&str; 8] = [
@@ -19,10 +19,10 @@ const TESTS: [&str; 8] = [
     "--test",
     "unsafe_code",
 ];
-/// Has those tests write what they compare with.
+/// Makes those tests write the expected figures.
 const OVERWRITE: &str = "DITHERSTEER_OVERWRITE_EXPECTED";
 
-/// Builds the images, and compares what can be proved of them with the recorded figures, or records it.
+/// Builds the images, and compares their proved figures with the recorded ones, or records them.
 pub fn run(overwrite_expected: bool) -> Result<()> {
     let toolchain = stage("set-up", setup::tools)?;
     build(&toolchain)?;
@@ -36,7 +36,7 @@ pub fn run(overwrite_expected: bool) -> Result<()> {
         ran.context(Exit::failed("a proof failed; its output is above"))
     })?;
     if overwrite_expected {
-        println!("recorded in tests/golden: look at `git diff tests/golden`");
+        println!("recorded in tests/golden: review `git diff tests/golden`");
     } else {
         println!("passed: the panic-free link, and all figures of tests/golden");
     }

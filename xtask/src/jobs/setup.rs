@@ -5,7 +5,7 @@ use anyhow::Result;
 use super::{build_sim_host, stage};
 use crate::{setup, workspace};
 
-/// Installs what is missing and builds the runner.
+/// Installs missing tools and builds the runner.
 pub fn run() -> Result<()> {
     let toolchain = stage("set-up", setup::tools)?;
     stage("runner", build_sim_host)?;

@@ -1,4 +1,4 @@
-//! `cargo xtask target-cost`: what Rust costs on the target, beside the same program in C.
+//! `cargo xtask target-cost`: instructions of Rust on the target, beside the same program in C.
 
 use anyhow::{Context, Result, bail};
 
@@ -8,8 +8,9 @@ use crate::outcome::Exit;
 use crate::{firmware, process, rustup, setup, workspace};
 
 const C_COMPILER: &str = "arm-none-eabi-gcc";
-/// The image, and the firmware's feature that builds the C in it.
-const IMAGE: [&str; 4] = ["--bin", "cost", "--features", "c-twin"];
+/// The package of the image, and its feature that compiles the C sources.
+const PACKAGE: &str = "c-reference";
+const WITH_C: [&str; 2] = ["--features", "gcc"];
 /// The test that runs it and judges.
 const TEST: [&str; 8] = [
     "test",
@@ -21,7 +22,7 @@ const TEST: [&str; 8] = [
     "--",
     "--nocapture",
 ];
-/// Has the test write what it compares with.
+/// Makes the test write the expected figures.
 const OVERWRITE: &str = "DITHERSTEER_OVERWRITE_EXPECTED";
 
 /// Builds both, and compares their bits and instructions, or records the latter.
@@ -50,14 +51,14 @@ pub fn run(overwrite_expected: bool) -> Result<()> {
     Ok(())
 }
 
-/// The C compiler is there. Set-up does not bring it: nothing else needs it.
+/// Whether the C compiler is installed. Set-up does not install it: nothing else needs it.
 pub fn has_c_compiler() -> bool {
     process::find(C_COMPILER).is_some()
 }
 
-/// Builds the image with both languages in it.
+/// Builds the image that contains both languages.
 pub fn build(toolchain: &str) -> Result<()> {
-    stage("firmware with its twin in C", || {
-        firmware::build(toolchain, firmware::USUAL_BOARD, &IMAGE)
+    stage("C reference", || {
+        process::run(firmware::cargo_on(toolchain, "build", PACKAGE)?.args(WITH_C))
     })
 }

@@ -1,16 +1,17 @@
 //! The target built from Debian's Rust packages, for machines where rustup cannot download.
 //!
 //! Debian's compiler comes with the source of its libraries. Their part that the firmware needs is built once, into
-//! a folder that rustup then knows as one more toolchain. Nothing in rustup's own toolchains changes.
+//! a folder that rustup links as one more toolchain. rustup's own toolchains do not change.
 
 use std::env;
-use std::fs;
+use std::fs::{self, Permissions};
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use super::target::{self, TARGET};
+use super::probe::{TARGET, builds};
 use crate::host::{self, Apt};
 use crate::{process, rustup, workspace};
 
@@ -20,7 +21,7 @@ const PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 const RUSTC: &str = "/usr/bin/rustc";
 const CARGO: &str = "/usr/bin/cargo";
 
-/// What set-up would do.
+/// The steps of set-up.
 pub fn plan() -> String {
     format!(
         "Debian's {} and a toolchain {TOOLCHAIN} made of them",
@@ -28,16 +29,16 @@ pub fn plan() -> String {
     )
 }
 
-/// Installs the packages, builds the libraries and makes the toolchain known, as far as that is not done yet.
+/// Installs the packages, builds the libraries and links the toolchain, each unless it is done already.
 pub fn install(pinned: &str) -> Result<()> {
     install_packages(pinned)?;
     let folder = folder()?;
-    // The libraries may be there, and only rustup not know them; or they may belong to an older compiler.
-    if !target::builds(Command::new(folder.join("bin/rustc")))? {
+    // The libraries may exist without being linked, or may belong to an older compiler.
+    if !builds(Command::new(folder.join("bin/rustc")))? {
         build(pinned, &folder)?;
     }
     println!(
-        "setup: making {} known to rustup as {TOOLCHAIN}",
+        "setup: linking {} into rustup as {TOOLCHAIN}",
         folder.display()
     );
     process::run(
@@ -83,7 +84,7 @@ fn install_packages(pinned: &str) -> Result<()> {
     let line = PACKAGES.join(" ");
     let Some(apt) = Apt::here() else {
         bail!(
-            "Debian's packages would do too: `sudo apt-get update && sudo apt-get install --no-install-recommends {line}`"
+            "Debian's packages are an alternative: `sudo apt-get update && sudo apt-get install --no-install-recommends {line}`"
         );
     };
     println!(
@@ -126,7 +127,7 @@ fn build(pinned: &str, folder: &Path) -> Result<()> {
     );
     let work = folder.with_extension("new");
     if work.exists() {
-        // Left behind by a set-up that was interrupted.
+        // From an interrupted set-up.
         fs::remove_dir_all(&work).with_context(|| format!("cannot remove {}", work.display()))?;
     }
     let libraries = build_libraries(&work)?;
@@ -168,7 +169,7 @@ fn build_libraries(work: &Path) -> Result<PathBuf> {
         "-Zbuild-std=core,alloc",
     ]);
     cargo.arg("-Zbuild-std-features=compiler-builtins-mem");
-    // An own cargo home, so that the user's configuration has no say; bitcode, so that the firmware can use LTO.
+    // An own cargo home, so that the user's configuration does not apply; bitcode, so that the firmware can use LTO.
     cargo
         .env("CARGO_HOME", work.join("cargo-home"))
         .env("CARGO_TARGET_DIR", work.join("target"));
@@ -225,7 +226,7 @@ fn assemble(pinned: &str, libraries: &Path, new: &Path, place: &Path) -> Result<
     Ok(())
 }
 
-/// Moves a complete toolchain to its place; an older one makes way.
+/// Moves a complete toolchain to its place; an older one is removed.
 fn replace(new: &Path, place: &Path) -> Result<()> {
     if place.exists() {
         fs::remove_dir_all(place).with_context(|| format!("cannot remove {}", place.display()))?;
@@ -233,17 +234,13 @@ fn replace(new: &Path, place: &Path) -> Result<()> {
     fs::rename(new, place).with_context(|| format!("cannot create {}", place.display()))
 }
 
-/// A symbolic link, by a program: this file must compile on Windows too, where it is never used.
 fn link(to: &Path, at: &Path) -> Result<()> {
-    let done = process::capture(Command::new("ln").arg("-s").arg(to).arg(at));
-    done.map(|_| ())
-        .with_context(|| format!("cannot create {}", at.display()))
+    symlink(to, at).with_context(|| format!("cannot create {}", at.display()))
 }
 
 fn script(path: &Path, line: &str) -> Result<()> {
     fs::write(path, format!("#!/bin/sh\n{line}\n"))?;
-    let done = process::capture(Command::new("chmod").arg("755").arg(path));
-    done.map(|_| ())
+    fs::set_permissions(path, Permissions::from_mode(0o755))
         .with_context(|| format!("cannot make {} executable", path.display()))
 }
 

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail};
 use crate::host::{Apt, Manager};
 use crate::{process, workspace};
 
-/// What the packages are for.
+/// Purpose of the packages.
 const PURPOSE: &str = "the comparison of the frames with autosar-e2e and cantools";
 /// Prints the version if the packages can be imported.
 const PROBE: &str = "import platform, cantools, e2e; print('Python', platform.python_version())";
@@ -21,7 +21,7 @@ const DEBIAN_PACKAGE: &str = "python3-venv";
 pub fn found() -> Result<Option<(PathBuf, String)>> {
     let python = program(&folder()?);
     let complete = fs::read_to_string(stamp()?).ok() == Some(fs::read_to_string(requirements())?);
-    // An upgrade of the machine's Python may leave an environment that finds its packages no more.
+    // After an upgrade of the machine's Python the environment may not find its packages.
     let version = process::capture(Command::new(&python).args(["-I", "-c", PROBE]));
     Ok(version
         .filter(|_| complete)
@@ -40,12 +40,12 @@ pub fn ensure() -> Result<()> {
         folder.display()
     );
     make(&folder).with_context(|| format!("{PURPOSE} would be untested"))?;
-    // Last, so that what was interrupted is done again.
+    // Last, so that an interrupted installation is repeated.
     fs::copy(requirements(), stamp()?)?;
     Ok(())
 }
 
-/// What set-up would do.
+/// The steps of set-up.
 pub fn plan() -> Result<String> {
     let line = format!(
         "`pip install -r {}` into {}",
@@ -95,7 +95,7 @@ fn requirements() -> PathBuf {
     workspace::root().join("tests/python/requirements.txt")
 }
 
-/// Where the virtual environment lies; `tests/frames.rs` looks there.
+/// The folder of the virtual environment, which `tests/frames.rs` uses.
 fn folder() -> Result<PathBuf> {
     Ok(workspace::target_dir()?.join("python"))
 }
@@ -106,15 +106,12 @@ fn stamp() -> Result<PathBuf> {
 }
 
 fn program(folder: &Path) -> PathBuf {
-    match cfg!(windows) {
-        true => folder.join("Scripts").join("python.exe"),
-        false => folder.join("bin").join("python"),
-    }
+    folder.join("bin").join("python")
 }
 
-/// The machine's Python 3. Windows has no `python3` but a stub that opens a shop.
+/// The machine's Python 3.
 fn system() -> Option<PathBuf> {
-    process::find(if cfg!(windows) { "python" } else { "python3" })
+    process::find("python3")
 }
 
 /// Whether there is a Python that can make virtual environments with pip in them.
@@ -128,6 +125,6 @@ fn has_venv() -> bool {
 fn by_hand() -> String {
     match Manager::of_this_machine() {
         Some(manager) => format!("type `{}`", manager.python_line()),
-        None => "install Python 3 as https://www.python.org says".to_owned(),
+        None => "install Python 3 (https://www.python.org)".to_owned(),
     }
 }

@@ -35,7 +35,7 @@ pub fn ensure() -> Result<()> {
     Ok(())
 }
 
-/// What set-up would do.
+/// The steps of set-up.
 pub fn plan() -> String {
     match Apt::here() {
         Some(_) => format!("set-up would: `apt-get install --no-install-recommends {PROGRAM}`"),
@@ -47,6 +47,6 @@ pub fn plan() -> String {
 fn by_hand() -> String {
     match Manager::of_this_machine() {
         Some(manager) => format!("type `{}`", manager.qemu_line()),
-        None => "install QEMU as https://www.qemu.org says".to_owned(),
+        None => "install QEMU (https://www.qemu.org)".to_owned(),
     }
 }

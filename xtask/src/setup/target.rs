@@ -1,24 +1,16 @@
 //! The compiler's target for the firmware: from rustup, or where rustup cannot download, from Debian's packages.
 
-use std::fs;
-use std::io::Write;
-use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 
 use super::debian;
+use super::probe::{TARGET, builds};
 use crate::process::{self, Ended};
-use crate::{rustup, workspace};
+use crate::rustup;
 
-/// The target of a Cortex-M4F and M7.
-pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// rustup tries again for many minutes where downloads are blocked.
 const RUSTUP_LIMIT: Duration = Duration::from_secs(90);
-/// Compiles and links only where the target's core library and a linker are there.
-const EMPTY_PROGRAM: &[u8] = b"#![no_std] #![no_main]
-#[panic_handler] fn panic(_: &core::panic::PanicInfo) -> ! { loop {} }
-#[unsafe(no_mangle)] extern \"C\" fn _start() -> ! { loop {} }";
 
 /// The toolchain that can build the firmware, the pinned one first.
 pub fn toolchain(pinned: &str) -> Result<Option<String>> {
@@ -54,10 +46,10 @@ pub fn ensure() -> Result<String> {
     Ok(toolchain)
 }
 
-/// What set-up would do about a missing target.
+/// The steps of set-up for a missing target.
 pub fn plan(pinned: &str) -> Result<String> {
     let debian = debian::plan();
-    Ok(match is_borrowed(pinned)? {
+    Ok(match is_linked(pinned)? {
         true => format!(
             "install {debian} ({pinned} only links to another toolchain, which stays as it is)"
         ),
@@ -81,12 +73,12 @@ fn add_line(pinned: &str) -> String {
 }
 
 /// A toolchain whose folder is a link belongs to another name, or another owner: nothing is written into it.
-fn is_borrowed(pinned: &str) -> Result<bool> {
+fn is_linked(pinned: &str) -> Result<bool> {
     Ok(rustup::folder(pinned)?.is_symlink())
 }
 
 fn add_through_rustup(pinned: &str) -> Result<bool> {
-    if is_borrowed(pinned)? {
+    if is_linked(pinned)? {
         println!("setup: rustup's {pinned} only links to another toolchain, which stays as it is");
         return Ok(false);
     }
@@ -95,7 +87,7 @@ fn add_through_rustup(pinned: &str) -> Result<bool> {
         rustup::folder(pinned)?.display()
     );
     let mut command = rustup::rustup()?;
-    // A blocked download is expected on some machines; rustup's own stack trace says nothing about it.
+    // A blocked download is expected on some machines; rustup's own stack trace would not explain it.
     command
         .args(["target", "add", "--toolchain", pinned, TARGET])
         .env_remove("RUST_BACKTRACE");
@@ -110,38 +102,7 @@ fn add_through_rustup(pinned: &str) -> Result<bool> {
     Ok(false)
 }
 
-/// Whether a toolchain that rustup knows builds for the target.
+/// Whether a toolchain of rustup builds for the target.
 fn has_target(toolchain: &str) -> Result<bool> {
     builds(rustup::tool(toolchain, "rustc")?)
-}
-
-/// Whether a compiler builds and links an empty program for the target.
-pub fn builds(mut rustc: Command) -> Result<bool> {
-    let folder = workspace::target_dir()?.join("xtask");
-    fs::create_dir_all(&folder).with_context(|| format!("cannot write to {}", folder.display()))?;
-    rustc
-        .args([
-            "--target",
-            TARGET,
-            "--edition=2024",
-            "-Cpanic=abort",
-            "-",
-            "-o",
-        ])
-        .arg(folder.join("probe.elf"));
-    let Ok(mut child) = rustc
-        .stdin(Stdio::piped())
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-    else {
-        return Ok(false);
-    };
-    // A rustup that knows no such toolchain reads nothing; its exit status is the answer.
-    let _ = child
-        .stdin
-        .take()
-        .expect("stdin is piped")
-        .write_all(EMPTY_PROGRAM);
-    Ok(child.wait()?.success())
 }

@@ -11,7 +11,7 @@ use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 /// Clock of the core, SysTick and the APB timers, Hz.
 const CLOCK_HZ: u32 = 25_000_000;
 
-/// The emulator runs with `-icount shift=5`: 32 ns an instruction, a little above the real board's one instruction a
+/// The emulator runs with `-icount shift=5`: 32 ns per instruction, a little above the real board's one instruction per
 /// clock at best, and slow enough that the 25 MHz counters resolve single instructions.
 const INSTRUCTION_RATE_HZ: u32 = 31_250_000;
 

@@ -2,6 +2,7 @@
 
 use files::input;
 use shared_model::settings::Choice;
+use shared_model::short::Short;
 use shared_model::{InvalidScenario, Preset, Scenario};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -44,7 +45,7 @@ pub enum ConfigError {
         expected: String,
     },
     /// No such preset.
-    #[error("unknown preset {name:?}: must be one of {}", names::<Preset>())]
+    #[error("unknown preset {name:?}: must be one of {}", names::<Preset>().join(", "))]
     UnknownPreset {
         /// The name.
         name: String,
@@ -59,9 +60,8 @@ fn suggest(near: &Option<String>) -> String {
         .map_or_else(String::new, |near| format!("; did you mean {near}?"))
 }
 
-fn names<C: Choice>() -> String {
-    let names: Vec<&str> = C::ALL.iter().map(|&(name, _)| name).collect();
-    names.join(", ")
+fn names<C: Choice>() -> Vec<&'static str> {
+    C::ALL.iter().map(|choice| choice.name()).collect()
 }
 
 /// Key of the preset in a file.
@@ -108,6 +108,38 @@ pub fn validate(scenario: &Scenario<f64>) -> Result<(), ConfigError> {
 /// A scenario as a complete TOML file.
 pub fn to_toml(scenario: &Scenario<f64>) -> String {
     table_of(scenario).to_string()
+}
+
+/// As [`to_toml`], with the allowed range or names of each parameter as a comment.
+///
+/// ```
+/// use shared_model::Scenario;
+/// let text = crate::config::to_commented_toml(&Scenario::reconstruction());
+/// assert!(text.contains("mass_kg = 1500.0 # 1 to 100000\n"));
+/// ```
+pub fn to_commented_toml(scenario: &Scenario<f64>) -> String {
+    let mut section = String::new();
+    let mut text = String::new();
+    for line in to_toml(scenario).lines() {
+        text += line;
+        if let Some(name) = line.strip_prefix('[') {
+            section = name.trim_end_matches(']').to_owned();
+        } else if let Some((name, _)) = line.split_once(" = ")
+            && let Some(allowed) = allowed(&format!("{section}.{name}"))
+        {
+            text += &format!(" # {allowed}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// The allowed values of the parameter of that key, where its value does not show them.
+fn allowed(key: &str) -> Option<String> {
+    match Scenario::<f64>::range(key) {
+        Some((min, max)) => Some(format!("{} to {}", Short(min), Short(max))),
+        None => choices(key).map(|names| names.join(", ")),
+    }
 }
 
 /// The parameters in which a scenario differs from the paper's (the preset `reconstruction`), each as `key = value (paper's
@@ -175,29 +207,28 @@ fn merge(base: &mut Table, over: Table, prefix: &str) -> Result<(), ConfigError>
     Ok(())
 }
 
-/// The value of a parameter that is one of a few names, if it is one of them.
-fn choice(key: &str, value: String) -> Result<String, ConfigError> {
+/// The names that the parameter of that key can have; `None` if it is none with names.
+fn choices(key: &str) -> Option<Vec<&'static str>> {
     use shared_model::dither::{Application, Waveform};
     use shared_model::{friction::FrictionLaw, tire::TireModel, vehicle::SlipForm};
-    fn check<C: Choice>(value: &str) -> Result<(), String> {
-        C::from_name(value).map(|_| ()).ok_or_else(names::<C>)
+    match key {
+        "vehicle.slip_form" => Some(names::<SlipForm>()),
+        "tires.model" => Some(names::<TireModel>()),
+        "friction.law" => Some(names::<FrictionLaw>()),
+        "dither.waveform" => Some(names::<Waveform>()),
+        "dither.application" => Some(names::<Application>()),
+        _ => None,
     }
-    let known = match key {
-        "vehicle.slip_form" => check::<SlipForm>(&value),
-        "tires.model" => check::<TireModel>(&value),
-        "friction.law" => check::<FrictionLaw>(&value),
-        "dither.waveform" => check::<Waveform>(&value),
-        "dither.application" => check::<Application>(&value),
-        _ => unreachable!("{key} is no parameter with names"),
-    };
-    known.map_err(|names| {
-        wrong_kind(
-            key,
-            &Value::String(value.clone()),
-            &format!("one of {names}"),
-        )
-    })?;
-    Ok(value)
+}
+
+/// The value of a parameter that is one of a few names, if it is one of them.
+fn choice(key: &str, value: String) -> Result<String, ConfigError> {
+    let names = choices(key).unwrap_or_default();
+    if names.contains(&value.as_str()) {
+        return Ok(value);
+    }
+    let expected = format!("one of {}", names.join(", "));
+    Err(wrong_kind(key, &Value::String(value), &expected))
 }
 
 fn kind(value: &Value) -> &'static str {

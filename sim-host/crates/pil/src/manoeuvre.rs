@@ -54,19 +54,19 @@ impl ParameterSet<f64> for RequestSine {
             name: "amplitude_a",
             min: 0.0,
             max: CURRENT_RANGE_A.1,
-            place: |p| &mut p.amplitude_a,
+            accessor: |p| &mut p.amplitude_a,
         },
         Field {
             name: "frequency_hz",
             min: 0.0,
             max: 1000.0,
-            place: |p| &mut p.frequency_hz,
+            accessor: |p| &mut p.frequency_hz,
         },
         Field {
             name: "start_time_s",
             min: 0.0,
             max: 1e5,
-            place: |p| &mut p.start_time_s,
+            accessor: |p| &mut p.start_time_s,
         },
     ];
 }

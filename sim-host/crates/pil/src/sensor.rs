@@ -32,25 +32,25 @@ impl ParameterSet<f64> for PerSensor {
             name: "wheel_speed_rpm",
             min: 0.0,
             max: 1e5,
-            place: |p| &mut p.wheel_speed_rpm,
+            accessor: |p| &mut p.wheel_speed_rpm,
         },
         Field {
             name: "yaw_rate_rad_per_s",
             min: 0.0,
             max: 100.0,
-            place: |p| &mut p.yaw_rate_rad_per_s,
+            accessor: |p| &mut p.yaw_rate_rad_per_s,
         },
         Field {
             name: "steering_angle_rad",
             min: 0.0,
             max: 10.0,
-            place: |p| &mut p.steering_angle_rad,
+            accessor: |p| &mut p.steering_angle_rad,
         },
         Field {
             name: "steering_rate_rad_per_s",
             min: 0.0,
             max: 1000.0,
-            place: |p| &mut p.steering_rate_rad_per_s,
+            accessor: |p| &mut p.steering_rate_rad_per_s,
         },
     ];
 }

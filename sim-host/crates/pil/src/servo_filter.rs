@@ -46,13 +46,13 @@ impl ParameterSet<f64> for ServoFilter {
             name: "corner_rad_per_s",
             min: 1e-3,
             max: 1e5,
-            place: |p| &mut p.corner_rad_per_s,
+            accessor: |p| &mut p.corner_rad_per_s,
         },
         Field {
             name: "dither_limit_rad",
             min: 0.0,
             max: 10.0,
-            place: |p| &mut p.dither_limit_rad,
+            accessor: |p| &mut p.dither_limit_rad,
         },
     ];
 }

@@ -8,7 +8,7 @@ use pil::manoeuvre::{Manoeuvre, load};
 use pil::run::{Depth, Run, compare, run};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use shared_model::schedule::Table;
+use shared_model::ecu_schedule::Table;
 use shared_model::signal::Mode;
 use std::path::Path;
 

@@ -110,7 +110,6 @@ pub fn meaning(exit_code: i32) -> &'static str {
         15 => "the watchdog bit; the PWM was put to neutral",
         16 => "unexpected interrupt; the PWM was put to neutral",
         17 => "the link to the vehicle is lost; the PWM was put to neutral",
-        18 => "the twin in C gave other bits",
         _ => "unknown exit code",
     }
 }

@@ -10,6 +10,7 @@ use plot::figure::figure;
 use plot::raster::Raster;
 use plot::style::{INK, TICK_FONT, WIDTH};
 use shared_model::dither::Waveform;
+use shared_model::listed;
 
 const PANEL_HEIGHT: i32 = 440;
 const TICKS_ACROSS: usize = 6;
@@ -27,25 +28,17 @@ const BEYOND: f64 = 0.002;
 /// Periods with a shade of their own.
 const PERIODS: u32 = 4;
 
-/// What a row of panels shows.
-#[derive(Clone, Copy)]
-enum Shown {
-    Exponent,
-    Period,
-    YawRate,
+listed! {
+    /// What a row of panels shows.
+    #[derive(Clone, Copy)]
+    enum Shown {
+        Exponent => "exponent (1/s)",
+        Period => "period",
+        YawRate => "yaw rate (rad/s)",
+    }
 }
 
 impl Shown {
-    const ALL: [Self; 3] = [Self::Exponent, Self::Period, Self::YawRate];
-
-    fn caption(self) -> &'static str {
-        match self {
-            Self::Exponent => "exponent (1/s)",
-            Self::Period => "period",
-            Self::YawRate => "yaw rate (rad/s)",
-        }
-    }
-
     fn number(self, cell: &Cell) -> Option<f64> {
         match self {
             Self::Exponent => shown_exponent(cell),
@@ -200,7 +193,7 @@ fn draw_row(
     for ((sheet, cells), area) in sheets.iter().zip(panels.columns(sheets.len())) {
         let (x, y) = axes(plan, sheet);
         let (from, to) = ((x.low, y.low), (x.high, y.high));
-        let caption = format!("{}: {}", name(sheet), shown.caption());
+        let caption = format!("{}: {}", name(sheet), shown.name());
         let panel = Axes::new(&area, (&caption, ""), x, y);
         let colour = |cell: &Cell| match &scale {
             Some(scale) => shown

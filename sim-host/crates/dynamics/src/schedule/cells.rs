@@ -3,45 +3,27 @@
 use super::Plan;
 use crate::attractor::{Attractor, Kind, attractors};
 use crate::sweep::{Parameter, RunControl, SweepError, Timing, mirrored};
-use shared_model::Scenario;
+use shared_model::{Scenario, listed};
 
-/// The worse of the motions from both starts; from good to bad.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Class {
-    /// Both at rest.
-    Rest,
-    /// At least one of period one, the other too or at rest.
-    PeriodOne,
-    /// One of a higher period.
-    PeriodN,
-    /// One that does not repeat: chaos, or a transient that outlasts the run.
-    NoPeriod,
-    /// One leaves all bounds.
-    Diverges,
+listed! {
+    /// The worse of the motions from both starts; from good to bad.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+    #[serde(rename_all = "snake_case")]
+    pub enum Class {
+        /// Both at rest.
+        Rest => "at rest",
+        /// At least one of period one, the other too or at rest.
+        PeriodOne => "period one",
+        /// One of a higher period.
+        PeriodN => "period n",
+        /// One that does not repeat: chaos, or a transient that outlasts the run.
+        NoPeriod => "no period",
+        /// One leaves all bounds.
+        Diverges => "diverges",
+    }
 }
 
 impl Class {
-    /// All classes, from good to bad.
-    pub const ALL: [Self; 5] = [
-        Self::Rest,
-        Self::PeriodOne,
-        Self::PeriodN,
-        Self::NoPeriod,
-        Self::Diverges,
-    ];
-
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rest => "at rest",
-            Self::PeriodOne => "period one",
-            Self::PeriodN => "period n",
-            Self::NoPeriod => "no period",
-            Self::Diverges => "diverges",
-        }
-    }
-
     /// At rest or of period one: what a schedule is after.
     pub fn is_calm(self) -> bool {
         self <= Self::PeriodOne

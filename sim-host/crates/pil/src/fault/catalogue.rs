@@ -2,45 +2,28 @@
 
 use dynamics::words::counted;
 use shared_model::gate::Limits;
+use shared_model::listed;
 use shared_model::signal::Measurement;
 use std::fmt;
 
-/// A signal of the sensor frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Signal {
-    /// Wheel speed, rpm.
-    WheelSpeed,
-    /// Yaw rate, rad/s.
-    YawRate,
-    /// Steering angle, rad.
-    SteeringAngle,
-    /// Steering rate, rad/s.
-    SteeringRate,
-    /// Driver's current request, A.
-    CurrentRequest,
+listed! {
+    /// A signal of the sensor frame.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Signal {
+        /// Wheel speed, rpm.
+        WheelSpeed => "wheel speed",
+        /// Yaw rate, rad/s.
+        YawRate => "yaw rate",
+        /// Steering angle, rad.
+        SteeringAngle => "steering angle",
+        /// Steering rate, rad/s.
+        SteeringRate => "steering rate",
+        /// Driver's current request, A.
+        CurrentRequest => "current request",
+    }
 }
 
 impl Signal {
-    /// All signals.
-    pub const ALL: [Self; 5] = [
-        Self::WheelSpeed,
-        Self::YawRate,
-        Self::SteeringAngle,
-        Self::SteeringRate,
-        Self::CurrentRequest,
-    ];
-
-    /// Its name, for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::WheelSpeed => "wheel speed",
-            Self::YawRate => "yaw rate",
-            Self::SteeringAngle => "steering angle",
-            Self::SteeringRate => "steering rate",
-            Self::CurrentRequest => "current request",
-        }
-    }
-
     /// Its place in a measurement.
     pub fn of(self, measurement: &mut Measurement<f32>) -> &mut f32 {
         match self {
@@ -264,45 +247,23 @@ impl TimingFailure {
     }
 }
 
-/// Class of faults, as the totals are told by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Class {
-    /// What a sensor tells.
-    Sensor,
-    /// Frames on their way.
-    Link,
-    /// Interrupts and clock.
-    Timing,
-    /// Single bits in the ECU's memory.
-    Memory,
-    /// The servo.
-    Actuator,
-    /// The processor itself.
-    Processor,
-}
-
-impl Class {
-    /// All classes.
-    pub const ALL: [Self; 6] = [
-        Self::Sensor,
-        Self::Link,
-        Self::Timing,
-        Self::Memory,
-        Self::Actuator,
-        Self::Processor,
-    ];
-
-    /// Its name, for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Sensor => "sensor",
-            Self::Link => "link",
-            Self::Timing => "timing",
-            Self::Memory => "memory",
-            Self::Actuator => "actuator",
-            Self::Processor => "processor",
-        }
+listed! {
+    /// Class of faults, as the totals are told by.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+    #[serde(rename_all = "lowercase")]
+    pub enum Class {
+        /// What a sensor tells.
+        Sensor => "sensor",
+        /// Frames on their way.
+        Link => "link",
+        /// Interrupts and clock.
+        Timing => "timing",
+        /// Single bits in the ECU's memory.
+        Memory => "memory",
+        /// The servo.
+        Actuator => "actuator",
+        /// The processor itself.
+        Processor => "processor",
     }
 }
 

@@ -4,6 +4,7 @@ use super::processor::Action;
 use image::{Image, Symbol};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
+use shared_model::listed;
 
 /// The same flips in every run.
 const SEED: u64 = 4;
@@ -16,46 +17,26 @@ const CONTROL_TASK: &str = "in_loop13place_control";
 const PWM_TASK: &str = "in_loop9place_pwm";
 const MAILBOXES: [&str; 2] = ["in_loop5INPUT", "in_loop6OUTPUT"];
 
-/// A part of the memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Region {
-    /// State, parameters and dither tables of the control task.
-    ControlTask,
-    /// State and parameters of the PWM task.
-    PwmTask,
-    /// What the tasks pass to each other.
-    Mailboxes,
-    /// All other variables.
-    OtherVariables,
-    /// The stack in use.
-    Stack,
-    /// Code of the tasks.
-    Code,
+listed! {
+    /// A part of the memory.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum Region {
+        /// State, parameters and dither tables of the control task.
+        ControlTask => "memory: control task",
+        /// State and parameters of the PWM task.
+        PwmTask => "memory: PWM task",
+        /// What the tasks pass to each other.
+        Mailboxes => "memory: mailboxes",
+        /// All other variables.
+        OtherVariables => "memory: other variables",
+        /// The stack in use.
+        Stack => "memory: stack",
+        /// Code of the tasks.
+        Code => "memory: code",
+    }
 }
 
 impl Region {
-    /// All regions.
-    pub const ALL: [Self; 6] = [
-        Self::ControlTask,
-        Self::PwmTask,
-        Self::Mailboxes,
-        Self::OtherVariables,
-        Self::Stack,
-        Self::Code,
-    ];
-
-    /// Its name, for reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ControlTask => "memory: control task",
-            Self::PwmTask => "memory: PWM task",
-            Self::Mailboxes => "memory: mailboxes",
-            Self::OtherVariables => "memory: other variables",
-            Self::Stack => "memory: stack",
-            Self::Code => "memory: code",
-        }
-    }
-
     fn holds(self, symbol: &Symbol) -> bool {
         let is = |part: &str| symbol.name.contains(part);
         let is_mailbox = MAILBOXES.into_iter().any(is);

@@ -1,21 +1,21 @@
-//! Does the gate let the controller's commands through? Asked once, before the first tick, so that a scenario which does not fit
-//! is refused by name and not by a safe state at some later time.
+//! Consistency of controller and gate: the gate must pass the controller's commands. Checked once, before the first tick,
+//! so that an inconsistent scenario is refused with the name of the number, and not by a later safe state.
 
 use crate::dither::Waveform;
+use crate::ecu_schedule::Table;
 use crate::parameter::OutOfRange;
-use crate::schedule::Table;
 use crate::{Real, Scenario};
 
-/// What a number may be off by the rounding of f32; the gate's own limits have the same room.
+/// Tolerance for the rounding of f32, relative; the gate's own limits have the same.
 const ROUNDING: f64 = 1e-6;
 
 /// Checks the numbers of a valid scenario against each other.
 ///
 /// # Errors
-/// The first number that does not fit, with the range that the others leave it.
+/// The first inconsistent number, with the range that the others leave.
 pub(super) fn check<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     let gate = &scenario.gate;
-    fits(
+    require(
         "gate",
         "safe_wheel_speed_rpm",
         gate.safe_wheel_speed_rpm,
@@ -31,7 +31,7 @@ fn check_motor<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     let resistance_ohm = scenario.servo.winding_resistance_ohm;
     let a_per_v = T::from_f64(1.0 + ROUNDING) / resistance_ohm;
     let most_a = gate.motor_voltage_v * a_per_v;
-    fits(
+    require(
         "policy",
         "motor_current_a",
         policy.motor_current_a,
@@ -39,7 +39,7 @@ fn check_motor<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
         most_a,
     )?;
     let fastest = gate.motor_slew_v_per_s * a_per_v;
-    fits(
+    require(
         "policy",
         "motor_slew_a_per_s",
         policy.motor_slew_a_per_s,
@@ -66,19 +66,19 @@ fn check_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     let peak_v = Table::of(scenario.dither.waveform).peak_v();
     let motor_v = scenario.policy.motor_current_a * servo.winding_resistance_ohm;
     let unlimited = T::from_f64(1e6);
-    // Of fewer samples in half a period not even their signs tell a frequency.
+    // With fewer samples in half a period not even their signs determine a frequency.
     let two_samples = T::from_f64(core::f64::consts::FRAC_PI_2) * scenario.run.pwm_rate_hz;
     let slowest = gate.dither_frequency_min_rad_per_s;
     let fastest = gate.dither_frequency_max_rad_per_s;
-    fits(
+    require(
         "gate",
         "dither_frequency_max_rad_per_s",
         fastest,
         slowest,
         two_samples,
     )?;
-    fits("gate", amplitude, limit_v, peak_v, unlimited)?;
-    fits(
+    require("gate", amplitude, limit_v, peak_v, unlimited)?;
+    require(
         "servo",
         "bus_voltage_v",
         servo.bus_voltage_v,
@@ -86,10 +86,10 @@ fn check_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
         unlimited,
     )?;
     let frequency_rad_per_s = scenario.dither.frequency_rad_per_s();
-    fits("dither", frequency, frequency_rad_per_s, slowest, fastest)
+    require("dither", frequency, frequency_rad_per_s, slowest, fastest)
 }
 
-fn fits<T: Real>(
+fn require<T: Real>(
     section: &'static str,
     name: &'static str,
     value: T,

@@ -1,8 +1,8 @@
-//! The vehicle: lateral, yaw and steering motion at constant speed, equation (14).
+//! The right-hand side of the equations of motion, and its state.
 
+use super::chassis::{SlipForm, Vehicle};
 use crate::dither::Injection;
 use crate::friction::{Friction, FrictionLaw, FrictionMode, Sign};
-use crate::parameter::{Field, ParameterSet};
 use crate::tire::Tire;
 use crate::{Real, Scenario};
 use nalgebra::Vector4;
@@ -15,96 +15,6 @@ pub const YAW_RATE: usize = 1;
 pub const STEERING_ANGLE: usize = 2;
 /// Index of the steering rate (rad/s) in a state vector.
 pub const STEERING_RATE: usize = 3;
-
-/// Form of the slip angles and of the yaw moment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum SlipForm {
-    /// Second lines of (4) and (5); yaw moment without cos(beta), as in (14).
-    SmallAngle,
-    /// First lines of (4) and (5); yaw moment with cos(beta), as in (3).
-    Exact,
-}
-
-/// Parameters of the chassis, Table 2.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Vehicle<T> {
-    /// Form of the slip angles.
-    pub slip_form: SlipForm,
-    /// Mass m, kg.
-    pub mass_kg: T,
-    /// Yaw moment of inertia I_z, kg m^2.
-    pub yaw_inertia_kg_m2: T,
-    /// Distance l_f from the centre of gravity to the front axle, m.
-    pub front_axle_distance_m: T,
-    /// Distance l_r from the centre of gravity to the rear axle, m.
-    pub rear_axle_distance_m: T,
-    /// Wheel radius R, m (the paper's is in cm).
-    pub wheel_radius_m: T,
-}
-
-impl<T: Real> Vehicle<T> {
-    /// Speed v = 2 pi R N/60, m/s, at the wheel speed N, equation (2).
-    ///
-    /// ```
-    /// let vehicle = shared_model::Scenario::reconstruction().vehicle;
-    /// assert!((vehicle.speed_m_per_s(1750.0) - 54.977_871_437_f64).abs() < 1e-9);
-    /// ```
-    pub fn speed_m_per_s(&self, wheel_speed_rpm: T) -> T {
-        T::from_f64(core::f64::consts::TAU / 60.0) * self.wheel_radius_m * wheel_speed_rpm
-    }
-
-    /// The same parameters in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Vehicle<U> {
-        Vehicle {
-            slip_form: self.slip_form,
-            mass_kg: f(self.mass_kg),
-            yaw_inertia_kg_m2: f(self.yaw_inertia_kg_m2),
-            front_axle_distance_m: f(self.front_axle_distance_m),
-            rear_axle_distance_m: f(self.rear_axle_distance_m),
-            wheel_radius_m: f(self.wheel_radius_m),
-        }
-    }
-}
-
-impl<T: Real> ParameterSet<T> for Vehicle<T> {
-    const SECTION: &'static str = "vehicle";
-    const FIELDS: &'static [Field<Self, T>] = &[
-        Field {
-            name: "mass_kg",
-            min: 1.0,
-            max: 1e5,
-            place: |p| &mut p.mass_kg,
-        },
-        Field {
-            name: "yaw_inertia_kg_m2",
-            min: 1.0,
-            max: 1e6,
-            place: |p| &mut p.yaw_inertia_kg_m2,
-        },
-        Field {
-            name: "front_axle_distance_m",
-            min: 0.01,
-            max: 20.0,
-            place: |p| &mut p.front_axle_distance_m,
-        },
-        Field {
-            name: "rear_axle_distance_m",
-            min: 0.01,
-            max: 20.0,
-            place: |p| &mut p.rear_axle_distance_m,
-        },
-        Field {
-            name: "wheel_radius_m",
-            min: 0.01,
-            max: 5.0,
-            place: |p| &mut p.wheel_radius_m,
-        },
-    ];
-}
 
 /// State of the model: the vector and the friction element's mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,7 +35,7 @@ impl<T: Real> State<T> {
     }
 }
 
-/// The right-hand side of (14) with its constants worked out for one scenario and wheel speed.
+/// The right-hand side of (14) with its constants computed for one scenario and wheel speed.
 #[derive(Debug, Clone, Copy)]
 pub struct Model<T> {
     slip_form: SlipForm,
@@ -148,7 +58,7 @@ pub struct Model<T> {
     dither_frequency_rad_per_s: T,
 }
 
-/// The numbers in [`Model::derivative`], for whoever evaluates it in another form.
+/// The constants of [`Model::derivative`], for its evaluation in another form.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Constants<T> {
     /// Form of the slip angles.
@@ -174,7 +84,7 @@ pub struct Constants<T> {
 }
 
 impl<T: Real> Model<T> {
-    /// The numbers in the derivative beside those of tyres and friction.
+    /// The constants of the derivative except those of tyres and friction.
     pub fn constants(&self) -> Constants<T> {
         Constants {
             slip_form: self.slip_form,
@@ -201,7 +111,8 @@ impl<T: Real> Model<T> {
         let mut friction = scenario.friction;
         let friction_limit_nm = friction.limit_nm(steering.pneumatic_trail_m);
         if friction_limit_nm == T::zero() {
-            // Friction without torque is none. Its modes would change without an effect, and without end where the steering comes to rest.
+            // A friction law without torque would only change modes without effect, endlessly where the steering comes to
+            // rest.
             friction.law = FrictionLaw::None;
         }
         let mut model = Self {
@@ -226,8 +137,8 @@ impl<T: Real> Model<T> {
         model
     }
 
-    /// Goes on at another wheel speed N, rpm, for a speed that changes slowly: (14) holds it constant and has no term in its
-    /// rate.
+    /// Continues at another wheel speed N, rpm, for a speed that changes slowly: (14) holds it constant and has no term
+    /// in its rate.
     pub fn set_wheel_speed_rpm(&mut self, vehicle: &Vehicle<T>, wheel_speed_rpm: T) {
         let speed = vehicle.speed_m_per_s(wheel_speed_rpm);
         self.front_lever_s = vehicle.front_axle_distance_m / speed;
@@ -235,7 +146,7 @@ impl<T: Real> Model<T> {
         self.lateral_gain = T::one() / (vehicle.mass_kg * speed);
     }
 
-    /// Goes on with another torque of the motor about the steering axis, r_s tau_M, N m.
+    /// Continues with another torque of the motor about the steering axis, r_s tau_M, N m.
     pub fn set_motor_torque_nm(&mut self, motor_torque_nm: T) {
         self.motor_torque_nm = motor_torque_nm;
     }

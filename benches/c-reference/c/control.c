@@ -2,7 +2,7 @@
 
 #include "channels.h"
 #include "gate.h"
-#include "twin.h"
+#include "reference.h"
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -100,7 +100,7 @@ struct supervisor {
     uint32_t ticks_since_frame;
     enum mode mode;
     uint32_t faults;
-    struct twin_setpoint setpoint;
+    struct reference_setpoint setpoint;
 };
 
 struct channel {
@@ -126,7 +126,7 @@ static inline uint16_t crc_byte(uint16_t crc, uint8_t byte)
     return (uint16_t)(crc << 8) ^ crc_table[(crc >> 8) ^ byte];
 }
 
-/* Of the frame behind the checksum's own bytes, then of the data ID. */
+/* Of the frame after the checksum's own bytes, then of the data ID. */
 static inline uint16_t checksum(const uint8_t *frame, uint16_t data_id)
 {
     uint16_t crc = 0xFFFF;
@@ -137,7 +137,7 @@ static inline uint16_t checksum(const uint8_t *frame, uint16_t data_id)
     return crc_byte(crc, data_id >> 8);
 }
 
-static inline enum reception receive(struct channel *channel, const struct twin_control_input *input)
+static inline enum reception receive(struct channel *channel, const struct reference_control_input *input)
 {
     const uint8_t *frame = input->frame;
 
@@ -218,7 +218,7 @@ static inline void switch_dither(struct controller *controller, float speed_rpm)
         controller->dither_on = true;
 }
 
-static inline struct twin_setpoint controller_run(struct controller *controller, const struct measurement *now)
+static inline struct reference_setpoint controller_run(struct controller *controller, const struct measurement *now)
 {
     switch_dither(controller, now->wheel_speed_rpm);
     const float wanted_v = controller->dither_on ? scheduled_v(controller, now->wheel_speed_rpm) : 0.0f;
@@ -226,7 +226,7 @@ static inline struct twin_setpoint controller_run(struct controller *controller,
     const float request = limited(now->current_request_a, controller->policy.motor_current_a);
     const float slew = controller->policy.motor_slew_a_per_s * controller->period_s;
     controller->motor_current_a = towards(controller->motor_current_a, request, slew);
-    return (struct twin_setpoint){ controller->motor_current_a * controller->winding_resistance_ohm,
+    return (struct reference_setpoint){ controller->motor_current_a * controller->winding_resistance_ohm,
                                    controller->amplitude_v };
 }
 
@@ -301,7 +301,7 @@ static inline uint32_t check_measurement(struct plausibility *plausibility, cons
     return faults;
 }
 
-static inline uint32_t command_faults(const struct supervisor *supervisor, const struct twin_setpoint *command)
+static inline uint32_t command_faults(const struct supervisor *supervisor, const struct reference_setpoint *command)
 {
     if (!(isfinite(command->motor_v) && isfinite(command->dither_amplitude_v)))
         return 1u << FAULT_COMMAND_NOT_A_NUMBER;
@@ -314,7 +314,7 @@ static inline uint32_t command_faults(const struct supervisor *supervisor, const
 }
 
 static inline uint32_t judge(struct supervisor *supervisor, const struct measurement *now,
-                             const struct twin_setpoint *command, uint32_t elapsed_counts)
+                             const struct reference_setpoint *command, uint32_t elapsed_counts)
 {
     uint32_t faults = check_measurement(&supervisor->plausibility, &supervisor->limits, now) |
                       command_faults(supervisor, command);
@@ -334,7 +334,7 @@ static inline uint32_t judge(struct supervisor *supervisor, const struct measure
 
 static inline void towards_neutral(struct supervisor *supervisor)
 {
-    struct twin_setpoint *setpoint = &supervisor->setpoint;
+    struct reference_setpoint *setpoint = &supervisor->setpoint;
 
     if (setpoint->motor_v > supervisor->slew_v)
         setpoint->motor_v -= supervisor->slew_v;
@@ -349,7 +349,7 @@ static inline void towards_neutral(struct supervisor *supervisor)
 }
 
 static inline void supervisor_run(struct supervisor *supervisor, const struct measurement *now,
-                                  const struct twin_setpoint *command, uint32_t elapsed_counts,
+                                  const struct reference_setpoint *command, uint32_t elapsed_counts,
                                   uint32_t found_outside)
 {
     if (supervisor->mode != MODE_SAFE) {
@@ -360,20 +360,20 @@ static inline void supervisor_run(struct supervisor *supervisor, const struct me
             supervisor->mode = MODE_ACTIVE;
     }
     if (supervisor->mode == MODE_STARTING)
-        supervisor->setpoint = (struct twin_setpoint){ 0.0f, 0.0f };
+        supervisor->setpoint = (struct reference_setpoint){ 0.0f, 0.0f };
     else if (supervisor->mode == MODE_ACTIVE)
         supervisor->setpoint = *command;
     else
         towards_neutral(supervisor);
 }
 
-static inline struct twin_actuation channel_run(struct channel *channel, const struct twin_control_input *input,
+static inline struct reference_actuation channel_run(struct channel *channel, const struct reference_control_input *input,
                                                 uint32_t found_outside)
 {
     const enum reception reception = receive(channel, input);
     const bool is_new = reception == RECEIVED || reception == RECEIVED_SOME_LOST;
     struct supervisor *supervisor = &channel->supervisor;
-    struct twin_setpoint command = { 0.0f, 0.0f };
+    struct reference_setpoint command = { 0.0f, 0.0f };
 
     if (is_new) {
         memcpy(&channel->measurement, input->frame + 4, sizeof channel->measurement);
@@ -383,7 +383,7 @@ static inline struct twin_actuation channel_run(struct channel *channel, const s
     if (channel->has_measurement)
         command = controller_run(&channel->controller, &channel->measurement);
     supervisor_run(supervisor, is_new ? &channel->measurement : NULL, &command, input->elapsed_counts, found_outside);
-    return (struct twin_actuation){
+    return (struct reference_actuation){
         .mode = supervisor->mode,
         .faults = supervisor->faults,
         .motor_voltage_v = supervisor->setpoint.motor_v,
@@ -401,12 +401,12 @@ static inline float lower(float a, float b)
     return b < a || !isfinite(a) ? b : a;
 }
 
-static inline struct twin_actuation tell(struct channel *channel, const struct twin_actuation *told,
-                                         const struct twin_actuation *other, uint8_t *frame)
+static inline struct reference_actuation report(struct channel *channel, const struct reference_actuation *own,
+                                         const struct reference_actuation *other, uint8_t *frame)
 {
-    struct twin_actuation actuation = *told;
+    struct reference_actuation actuation = *own;
 
-    actuation.wheel_speed_limit_rpm = lower(told->wheel_speed_limit_rpm, other->wheel_speed_limit_rpm);
+    actuation.wheel_speed_limit_rpm = lower(own->wheel_speed_limit_rpm, other->wheel_speed_limit_rpm);
     frame[2] = channel->sent_counter++;
     frame[3] = (uint8_t)actuation.mode;
     memcpy(frame + 4, &actuation.faults, 4);
@@ -421,20 +421,20 @@ static inline struct twin_actuation tell(struct channel *channel, const struct t
     return actuation;
 }
 
-void twin_control_tick(void *memory, const void *given, void *result)
+void reference_control_tick(void *memory, const void *given, void *result)
 {
     struct task *task = memory;
-    const struct twin_control_input *input = given;
-    struct twin_control_output *output = result;
+    const struct reference_control_input *input = given;
+    struct reference_control_output *output = result;
     struct channel *a = &task->channels[0], *b = &task->channels[1];
     _Alignas(4) uint8_t frame[FRAME_LEN], other_frame[FRAME_LEN];
     const bool differ = task->frames_differed || !channels_agree(a, b, sizeof *a);
     const uint32_t found_outside = input->found_by_pwm | fault_if(differ, FAULT_CHANNELS_DIFFER);
-    const struct twin_actuation told_a = channel_run(a, input, found_outside);
-    const struct twin_actuation told_b = channel_run(b, input, found_outside);
+    const struct reference_actuation actuation_a = channel_run(a, input, found_outside);
+    const struct reference_actuation actuation_b = channel_run(b, input, found_outside);
 
-    output->actuation = tell(a, &told_a, &told_b, frame);
-    tell(b, &told_b, &told_a, other_frame);
+    output->actuation = report(a, &actuation_a, &actuation_b, frame);
+    report(b, &actuation_b, &actuation_a, other_frame);
     task->frames_differed = !channels_agree(frame, other_frame, sizeof frame);
     output->setpoints[0] = a->supervisor.setpoint;
     output->setpoints[1] = b->supervisor.setpoint;
@@ -480,7 +480,7 @@ static void crc_init(void)
     }
 }
 
-static void controller_init(struct controller *controller, const struct twin_choice *choice)
+static void controller_init(struct controller *controller, const struct reference_choice *choice)
 {
     float peak_v = 0.0f;
 
@@ -499,7 +499,7 @@ static void controller_init(struct controller *controller, const struct twin_cho
     controller->amplitude_step_v = peak_v / (controller->policy.dither_ramp_s * CONTROL_RATE_HZ);
 }
 
-static void supervisor_init(struct supervisor *supervisor, const struct twin_choice *choice)
+static void supervisor_init(struct supervisor *supervisor, const struct reference_choice *choice)
 {
     const struct limits *limits = &supervisor->limits;
     const float period_s = 1.0f / CONTROL_RATE_HZ;
@@ -522,12 +522,12 @@ static void supervisor_init(struct supervisor *supervisor, const struct twin_cho
     supervisor->frame_age_ticks = (uint32_t)(limits->frame_age_s * CONTROL_RATE_HZ + 0.5f);
 }
 
-size_t twin_control_size(void)
+size_t reference_control_size(void)
 {
     return sizeof(struct task);
 }
 
-void twin_control_init(void *memory, const struct twin_choice *choice)
+void reference_control_init(void *memory, const struct reference_choice *choice)
 {
     struct task *task = memory;
 

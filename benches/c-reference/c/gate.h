@@ -1,4 +1,4 @@
-/* What the gate can find, as in shared-model/src/gate/fault.rs: the number is the bit. */
+/* Faults that the gate detects, as in shared-model/src/gate/fault.rs: the number is the bit. */
 #ifndef GATE_H
 #define GATE_H
 

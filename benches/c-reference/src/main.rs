@@ -1,23 +1,23 @@
-//! What Rust costs: the model's step and the ECU program's two tasks beside the same in C, on the same inputs.
-//!
-//! The outputs must be equal in every bit. Takes a scenario as the ECU does, of which the twin in C knows the choices of waveform,
-//! tyre, slip angle and friction, the wheel speed and the time at which the dither sets in. Logs a line for each pair.
-
+#![doc = include_str!("../README.md")]
 #![no_std]
 #![no_main]
 
 mod count;
 mod drive;
-mod twin;
+mod interface;
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
+use cortex_m_semihosting::debug;
 use count::{Copies, REPEATS, Tally, counted};
 use drive::Drive;
 use firmware::board::{Board, Current};
 use firmware::exit::ExitCode;
 use firmware::{command_line, fault, log};
+use interface::{
+    Call, Choice, ControlInputOf, ControlOutputBits, InjectionOf, PwmInputOf, PwmOutput, StateBits,
+};
 use shared_model::dither::Injection;
 use shared_model::ecu::{ControlInput, ControlOutput, ControlTask, Ecu, PwmTask};
 use shared_model::exchange::FRAME_LEN;
@@ -26,15 +26,12 @@ use shared_model::gate::{Faults, Setpoint};
 use shared_model::signal::{Actuation, Mode};
 use shared_model::vehicle::{Model, State};
 use shared_model::{Scenario, integrate};
-use twin::{
-    Call, Choice, ControlInputOf, ControlOutputBits, InjectionOf, PwmInputOf, PwmOutput, StateBits,
-};
 
 /// Steps of the model, a millisecond each.
 const STEPS: u32 = 4000;
-/// Of so many the last begins in a state that no motion led to.
-const STEPS_A_MOTION: u32 = 40;
-/// Room for a task in C, which says how much it needs.
+/// The last step of this number begins in a random state.
+const STEPS_PER_TRAJECTORY: u32 = 40;
+/// Memory for a task in C, which reports its size.
 const MODEL_BYTES: usize = 512;
 const PWM_BYTES: usize = 256;
 const CONTROL_BYTES: usize = 1536;
@@ -141,8 +138,16 @@ fn run(scenario: &Scenario<f32>) -> ExitCode {
             defmt::info!("run complete; all bits equal");
             ExitCode::Complete
         }
-        (Some(_), Some(_)) => ExitCode::Unequal,
+        (Some(_), Some(_)) => unequal(),
         _ => ExitCode::BadScenario,
+    }
+}
+
+/// Ends the emulation with exit code 1: the firmware's own codes have none for this.
+fn unequal() -> ! {
+    defmt::error!("run failed: the bits of Rust and C differ");
+    loop {
+        debug::exit(debug::EXIT_FAILURE);
     }
 }
 
@@ -174,14 +179,13 @@ fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
         step_s: scenario.step_s(),
         state: model.initial_state(scenario),
     };
-    let twin = Memory::new(
+    let reference = Memory::new(
         // SAFETY: takes nothing.
-        unsafe { twin::twin_model_size() },
+        unsafe { interface::reference_model_size() },
         // SAFETY: there is enough of it.
-        |memory| unsafe { twin::twin_model_init(memory, choice) },
+        |memory| unsafe { interface::reference_model_init(memory, choice) },
     );
-    let mut pair =
-        pair!("model-step", ModelTask: task, step, MODEL_BYTES: twin, twin::twin_model_step);
+    let mut pair = pair!("model-step", ModelTask: task, step, MODEL_BYTES: reference, interface::reference_model_step);
     let mut random = Random(1);
     let mut injection = Injection::Off;
     let (mut at_rest, mut changes, mut unequal) = (0_u32, 0_u32, 0_u32);
@@ -189,20 +193,20 @@ fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
         if index == STEPS / 4 {
             injection = scenario.dither.injection(0.0);
         }
-        if index % STEPS_A_MOTION == STEPS_A_MOTION - 1 {
+        if index % STEPS_PER_TRAJECTORY == STEPS_PER_TRAJECTORY - 1 {
             pair.rust.state = model.state(random.vector().into());
         }
         let before = pair.rust.state.friction;
         let state = StateBits::from(&pair.rust.state);
         // SAFETY: the memory is a model's.
-        unsafe { twin::twin_model_set_state((&raw mut pair.c).cast(), &state) };
+        unsafe { interface::reference_model_set_state((&raw mut pair.c).cast(), &state) };
         pair.call(
             (&injection, &mut ()),
             (&InjectionOf::from(&injection), &mut ()),
         );
         let mut c = StateBits::default();
         // SAFETY: the memory is a model's.
-        unsafe { twin::twin_model_state((&raw const pair.c).cast(), &mut c) };
+        unsafe { interface::reference_model_state((&raw const pair.c).cast(), &mut c) };
         let after = pair.rust.state.friction;
         at_rest += u32::from(after == FrictionMode::Sticking);
         changes += u32::from(before != after);
@@ -218,7 +222,7 @@ fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
     Some(unequal == 0)
 }
 
-/// Numbers that look random.
+/// Pseudo-random numbers.
 struct Random(u32);
 
 impl Random {
@@ -281,22 +285,21 @@ unsafe extern "C" fn tick(task: *mut c_void, input: *const c_void, output: *mut 
 
 /// A drive; true if all periods and ticks are equal.
 fn run_ecu(scenario: &Scenario<f32>, ecu: Ecu<f32>, choice: &Choice) -> Option<bool> {
-    let pwm_twin = Memory::new(
+    let pwm_reference = Memory::new(
         // SAFETY: takes nothing.
-        unsafe { twin::twin_pwm_size() },
+        unsafe { interface::reference_pwm_size() },
         // SAFETY: there is enough of it.
-        |memory| unsafe { twin::twin_pwm_init(memory, choice) },
+        |memory| unsafe { interface::reference_pwm_init(memory, choice) },
     );
-    let control_twin = Memory::new(
+    let control_reference = Memory::new(
         // SAFETY: takes nothing.
-        unsafe { twin::twin_control_size() },
+        unsafe { interface::reference_control_size() },
         // SAFETY: there is enough of it.
-        |memory| unsafe { twin::twin_control_init(memory, choice) },
+        |memory| unsafe { interface::reference_control_init(memory, choice) },
     );
     let Ecu { pwm, control, .. } = ecu;
-    let mut pwm =
-        pair!("pwm-period", PwmTask<f32>: pwm, period, PWM_BYTES: pwm_twin, twin::twin_pwm_period);
-    let mut control = pair!("control-tick", ControlTask<f32>: control, tick, CONTROL_BYTES: control_twin, twin::twin_control_tick);
+    let mut pwm = pair!("pwm-period", PwmTask<f32>: pwm, period, PWM_BYTES: pwm_reference, interface::reference_pwm_period);
+    let mut control = pair!("control-tick", ControlTask<f32>: control, tick, CONTROL_BYTES: control_reference, interface::reference_control_tick);
     let mut drive = Drive::new(scenario);
     let nominal_counts = Current::COST_CLOCK_HZ / scenario.run.control_rate_hz as u32;
     let mut input = PwmInput {
@@ -338,7 +341,7 @@ fn run_ecu(scenario: &Scenario<f32>, ecu: Ecu<f32>, choice: &Choice) -> Option<b
     Some(unequal == 0)
 }
 
-/// What stands in the output's place before the first tick.
+/// Place holder of the output before the first tick.
 const NO_OUTPUT: ControlOutput<f32> = ControlOutput {
     setpoints: [Setpoint {
         motor_v: 0.0,

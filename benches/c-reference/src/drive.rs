@@ -1,5 +1,5 @@
-//! What the ECU meets: a drive through the speed at which the dither comes in, with frames that are lost, damaged and repeated, and
-//! a broken sensor towards its end.
+//! Input of the ECU: a drive through the speed at which the dither starts, with frames that are lost, damaged and
+//! repeated, and a broken sensor towards its end.
 
 use shared_model::dither::Injection;
 use shared_model::e2e::Sender;

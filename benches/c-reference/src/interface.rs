@@ -1,4 +1,4 @@
-//! What passes between the Rust program and its twin in C: the declarations of `c-twin/twin.h`.
+//! The interface of the Rust program and the C reference: the declarations of `c/reference.h`.
 
 use core::ffi::c_void;
 use shared_model::Scenario;
@@ -12,10 +12,10 @@ use shared_model::tire::TireModel;
 use shared_model::vehicle::{SlipForm, State};
 
 /// A call that is counted: task, input, output.
-// SAFETY: a type; whoever calls says why it may.
+// SAFETY: a type; each call has its own reason.
 pub type Call = unsafe extern "C" fn(*mut c_void, *const c_void, *mut c_void);
 
-/// What a scenario may choose.
+/// The choices of a scenario.
 #[repr(C)]
 pub struct Choice {
     waveform: u32,
@@ -190,34 +190,34 @@ pub struct ControlOutputBits {
 
 impl From<&ControlOutput<f32>> for ControlOutputBits {
     fn from(output: &ControlOutput<f32>) -> Self {
-        let told = &output.actuation;
+        let actuation = &output.actuation;
         Self {
             setpoints: setpoints(output),
             frame: output.frame,
-            mode: told.mode as u32,
-            faults: told.faults,
-            motor_voltage_v: told.motor_voltage_v.to_bits(),
-            dither_amplitude_v: told.dither_amplitude_v.to_bits(),
-            wheel_speed_limit_rpm: told.wheel_speed_limit_rpm.to_bits(),
-            warnings: told.warnings,
-            sensor_counter: told.sensor_counter,
+            mode: actuation.mode as u32,
+            faults: actuation.faults,
+            motor_voltage_v: actuation.motor_voltage_v.to_bits(),
+            dither_amplitude_v: actuation.dither_amplitude_v.to_bits(),
+            wheel_speed_limit_rpm: actuation.wheel_speed_limit_rpm.to_bits(),
+            warnings: actuation.warnings,
+            sensor_counter: actuation.sensor_counter,
         }
     }
 }
 
-// SAFETY: declared as in twin.h.
+// SAFETY: declared as in reference.h.
 unsafe extern "C" {
-    pub fn twin_model_size() -> usize;
-    pub fn twin_pwm_size() -> usize;
-    pub fn twin_control_size() -> usize;
-    pub fn twin_model_init(memory: *mut c_void, choice: *const Choice);
-    pub fn twin_pwm_init(memory: *mut c_void, choice: *const Choice);
-    pub fn twin_control_init(memory: *mut c_void, choice: *const Choice);
-    pub fn twin_model_set_state(memory: *mut c_void, state: *const StateBits);
-    pub fn twin_model_state(memory: *const c_void, state: *mut StateBits);
-    pub fn twin_model_step(memory: *mut c_void, injection: *const c_void, unused: *mut c_void);
-    pub fn twin_pwm_period(memory: *mut c_void, input: *const c_void, output: *mut c_void);
-    pub fn twin_control_tick(memory: *mut c_void, input: *const c_void, output: *mut c_void);
+    pub fn reference_model_size() -> usize;
+    pub fn reference_pwm_size() -> usize;
+    pub fn reference_control_size() -> usize;
+    pub fn reference_model_init(memory: *mut c_void, choice: *const Choice);
+    pub fn reference_pwm_init(memory: *mut c_void, choice: *const Choice);
+    pub fn reference_control_init(memory: *mut c_void, choice: *const Choice);
+    pub fn reference_model_set_state(memory: *mut c_void, state: *const StateBits);
+    pub fn reference_model_state(memory: *const c_void, state: *mut StateBits);
+    pub fn reference_model_step(memory: *mut c_void, injection: *const c_void, unused: *mut c_void);
+    pub fn reference_pwm_period(memory: *mut c_void, input: *const c_void, output: *mut c_void);
+    pub fn reference_control_tick(memory: *mut c_void, input: *const c_void, output: *mut c_void);
 }
 
 macro_rules! share {
@@ -232,8 +232,8 @@ macro_rules! share {
 
 // The transcendental functions are those of one library for both.
 share! {
-    twin_sinf = shared_model::Real::sin;
-    twin_cosf = shared_model::Real::cos;
-    twin_atanf = shared_model::Real::atan;
-    twin_asinf = shared_model::Real::asin;
+    reference_sinf = shared_model::Real::sin;
+    reference_cosf = shared_model::Real::cos;
+    reference_atanf = shared_model::Real::atan;
+    reference_asinf = shared_model::Real::asin;
 }

@@ -1,6 +1,6 @@
 //! Counts instructions by the emulator's time, in which one takes 32 ns.
 
-use crate::twin::Call;
+use crate::interface::Call;
 use core::ffi::c_void;
 use core::hint::black_box;
 use core::mem::MaybeUninit;
@@ -26,7 +26,7 @@ pub fn counted<T: Clone, I, O>(
     // Before the other, whose calls change the copies.
     let of_nothing = counts(nothing, copies, input, output);
     let counts = counts(call, copies, input, output).saturating_sub(of_nothing);
-    // SAFETY: whoever chose the call chose task, input and output for it.
+    // SAFETY: task, input and output were chosen for the call.
     unsafe { call_on(call, task, input, output) };
     let per_count = f64::from(Current::INSTRUCTION_RATE_HZ) / f64::from(Current::COST_CLOCK_HZ);
     (f64::from(counts) * per_count / REPEATS as f64 + 0.5) as u32
@@ -46,7 +46,7 @@ fn counts<T, I, O>(call: Call, tasks: &mut [T; REPEATS], input: &I, output: &mut
 #[inline(always)]
 // SAFETY: the call must be one for these.
 unsafe fn call_on<T, I, O>(call: Call, task: &mut T, input: &I, output: &mut O) {
-    // SAFETY: the caller's word.
+    // SAFETY: the caller guarantees it.
     unsafe {
         call(
             (&raw mut *task).cast::<c_void>(),
@@ -56,7 +56,7 @@ unsafe fn call_on<T, I, O>(call: Call, task: &mut T, input: &I, output: &mut O) 
     }
 }
 
-/// What a call costs that does nothing.
+/// A call that does nothing, for the cost of the call itself.
 // SAFETY: touches nothing.
 #[inline(never)]
 unsafe extern "C" fn nothing(_task: *mut c_void, _input: *const c_void, _output: *mut c_void) {

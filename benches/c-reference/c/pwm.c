@@ -2,13 +2,13 @@
 
 #include "channels.h"
 #include "gate.h"
-#include "twin.h"
+#include "reference.h"
 #include <math.h>
 #include <string.h>
 
 #define PI 3.14159265358979323846
 #define PWM_RATE_HZ 10000.0f
-#define PERIODS_A_TICK 10
+#define PERIODS_PER_TICK 10
 #define SINE_ERROR 1.2e-3f
 /* Periods in a row in which the pin may show another duty. */
 #define READBACK_TOLERANCE 1
@@ -27,7 +27,7 @@ struct limiter {
     uint32_t faults;
     float sample_error;
     uint16_t expected_code;
-    /* There is dither; the rest of a half period is told only then. */
+    /* There is dither; the rest of a half period is valid only then. */
     bool has_half_period;
     bool is_positive;
     bool is_whole;
@@ -43,8 +43,8 @@ struct channel {
     struct oscillator oscillator;
     struct limiter limiter;
     struct servo servo;
-    struct twin_setpoint setpoint;
-    uint32_t periods_a_tick;
+    struct reference_setpoint setpoint;
+    uint32_t periods_per_tick;
     uint32_t periods_to_tick;
 };
 
@@ -101,7 +101,7 @@ static inline float oscillator_sample(struct oscillator *oscillator)
 
 static inline void watch_half_period(struct limiter *limiter, float dither_v, float amplitude_v)
 {
-    /* Nearer to zero a sample's sign may be its error's. */
+    /* Closer to zero the sign of a sample may be that of its error. */
     const float sure_v = amplitude_v * limiter->sample_error;
 
     if (!limiter->has_half_period) {
@@ -124,7 +124,7 @@ static inline void watch_half_period(struct limiter *limiter, float dither_v, fl
 }
 
 /* Servo voltage: the motor's share and the dither's sample, the latter only if it is within its amplitude. */
-static inline float limiter_run(struct limiter *limiter, const struct twin_setpoint *setpoint, float dither_v)
+static inline float limiter_run(struct limiter *limiter, const struct reference_setpoint *setpoint, float dither_v)
 {
     const float amplitude_v = setpoint->dither_amplitude_v;
     const bool is_within = fabsf(dither_v) <= amplitude_v * (1.0f + limiter->sample_error);
@@ -172,7 +172,7 @@ static inline struct period channel_begin(struct channel *channel)
         channel->periods_to_tick--;
     if (channel->periods_to_tick == 0) {
         period.control_due = true;
-        channel->periods_to_tick = channel->periods_a_tick;
+        channel->periods_to_tick = channel->periods_per_tick;
     }
     return period;
 }
@@ -213,11 +213,11 @@ static inline uint32_t task_faults(struct task *task)
     return task->faults;
 }
 
-void twin_pwm_period(void *memory, const void *given, void *result)
+void reference_pwm_period(void *memory, const void *given, void *result)
 {
     struct task *task = memory;
-    const struct twin_pwm_input *input = given;
-    struct twin_pwm_output *output = result;
+    const struct reference_pwm_input *input = given;
+    struct reference_pwm_output *output = result;
     const struct period period = task_begin(task);
 
     if (period.control_due && input->has_setpoints) {
@@ -231,12 +231,12 @@ void twin_pwm_period(void *memory, const void *given, void *result)
     output->faults = period.control_due ? task_faults(task) : 0;
 }
 
-size_t twin_pwm_size(void)
+size_t reference_pwm_size(void)
 {
     return sizeof(struct task);
 }
 
-void twin_pwm_init(void *memory, const struct twin_choice *choice)
+void reference_pwm_init(void *memory, const struct reference_choice *choice)
 {
     struct task *task = memory;
     const float samples_times_rate = (float)PI * PWM_RATE_HZ;
@@ -258,7 +258,7 @@ void twin_pwm_init(void *memory, const struct twin_choice *choice)
         channel->servo.period = timer_period;
         channel->servo.midpoint = 0.5f * (float)timer_period;
         channel->servo.counts_per_volt = channel->servo.midpoint / 12.0f;
-        channel->periods_a_tick = PERIODS_A_TICK;
-        channel->periods_to_tick = PERIODS_A_TICK;
+        channel->periods_per_tick = PERIODS_PER_TICK;
+        channel->periods_to_tick = PERIODS_PER_TICK;
     }
 }

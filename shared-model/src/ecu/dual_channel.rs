@@ -1,14 +1,14 @@
-//! A task in two channels: the same program on two sets of parameters and state. A bit that flips in one of them is found by
-//! comparing the two.
+//! A task in two channels: the same program on two sets of parameters and state. Comparing the two detects a flipped bit in
+//! one of them.
 
-/// Two channels that are equal as long as memory keeps what was written.
+/// Two channels, which are equal unless memory is corrupted.
 #[derive(Debug, Clone, Copy)]
-pub struct Duplex<C>([C; 2]);
+pub struct DualChannel<C>([C; 2]);
 
-impl<C: Copy + PartialEq> Duplex<C> {
-    /// Two channels that begin alike.
+impl<C: Copy + PartialEq> DualChannel<C> {
+    /// Two equal channels.
     pub fn new(channel: C) -> Self {
-        // The optimiser must not see that the two are the same.
+        // Hides from the optimiser that the two are equal.
         Self([
             core::hint::black_box(channel),
             core::hint::black_box(channel),

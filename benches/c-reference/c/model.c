@@ -1,6 +1,6 @@
-/* The vehicle model's step: shared-model/src/integrate.rs, vehicle.rs, tire.rs and friction.rs. */
+/* The vehicle model's step: shared-model/src/integrate.rs, vehicle/model.rs, tire.rs and friction.rs. */
 
-#include "twin.h"
+#include "reference.h"
 
 #define NODES 32
 
@@ -74,7 +74,7 @@ struct change {
     float fraction;
     bool has_threshold;
     float threshold;
-    enum friction_mode behind;
+    enum friction_mode mode_after;
 };
 
 static inline float cubic_force(const struct cubic_tire *tire, float alpha)
@@ -94,8 +94,8 @@ static inline float softened_force(const struct cubic_tire *tire, float mean_squ
 static float magic_force(const struct magic_formula *tire, float alpha)
 {
     const float b_alpha = tire->stiffness_per_rad * alpha;
-    const float argument = b_alpha * (1.0f - tire->curvature) + tire->curvature * twin_atanf(b_alpha);
-    return tire->peak_n * twin_sinf(tire->shape * twin_atanf(argument));
+    const float argument = b_alpha * (1.0f - tire->curvature) + tire->curvature * reference_atanf(b_alpha);
+    return tire->peak_n * reference_sinf(tire->shape * reference_atanf(argument));
 }
 
 static float dithered_magic_force(const struct tire *tire, float alpha, struct injection injection)
@@ -145,9 +145,9 @@ static inline void cornering_forces(const struct model *model, const struct vect
         front_slip = model->front_lever_s * gamma;
         rear_slip = model->rear_lever_s * gamma;
     } else {
-        const float along = gamma * twin_cosf(beta);
-        front_slip = twin_atanf(model->front_lever_s * along);
-        rear_slip = twin_atanf(model->rear_lever_s * along);
+        const float along = gamma * reference_cosf(beta);
+        front_slip = reference_atanf(model->front_lever_s * along);
+        rear_slip = reference_atanf(model->rear_lever_s * along);
     }
     *front = tire_force(&model->front, beta + front_slip - delta, injection);
     *rear = tire_force(&model->rear, beta - rear_slip, injection);
@@ -207,7 +207,7 @@ static float smooth_sign(float amplitude, float argument)
         return 1.0f;
     if (ratio <= -1.0f)
         return -1.0f;
-    return twin_asinf(ratio) * 0.63661977236758134308f;
+    return reference_asinf(ratio) * 0.63661977236758134308f;
 }
 
 static inline bool can_stick(const struct model *model, struct injection injection)
@@ -276,7 +276,7 @@ static inline struct vector derivative(const struct model *model, const struct v
         acceleration = torque * model->inverse_steering_inertia;
     }
     if (model->slip_form == SLIP_EXACT)
-        yaw *= twin_cosf(state->x[SIDESLIP]);
+        yaw *= reference_cosf(state->x[SIDESLIP]);
     return (struct vector){ { (front + rear) * model->lateral_gain - gamma, yaw, rate, acceleration } };
 }
 
@@ -314,12 +314,12 @@ static inline struct vector runge_kutta_4(const struct model *model, const struc
 static inline bool release(const struct model *model, const struct vector *start, const struct vector *end,
                            struct injection injection, struct change *change)
 {
-    const enum friction_mode behind = mode_at_rest(model, end, injection);
+    const enum friction_mode mode_after = mode_at_rest(model, end, injection);
     float limit;
 
-    if (behind == FRICTION_POSITIVE)
+    if (mode_after == FRICTION_POSITIVE)
         limit = model->friction_limit_nm;
-    else if (behind == FRICTION_NEGATIVE)
+    else if (mode_after == FRICTION_NEGATIVE)
         limit = -model->friction_limit_nm;
     else
         return false;
@@ -327,7 +327,7 @@ static inline bool release(const struct model *model, const struct vector *start
     const float after = driving_torque_nm(model, end, injection);
     change->fraction = (limit - before) / (after - before);
     change->has_threshold = false;
-    change->behind = behind;
+    change->mode_after = mode_after;
     return true;
 }
 
@@ -344,16 +344,16 @@ static inline bool crossing(const struct model *model, const struct vector *star
         return false;
     if (mode == FRICTION_POSITIVE && after < sign.upper) {
         change->threshold = sign.upper;
-        change->behind = apart ? FRICTION_NEUTRAL : FRICTION_NEGATIVE;
+        change->mode_after = apart ? FRICTION_NEUTRAL : FRICTION_NEGATIVE;
     } else if (mode == FRICTION_NEGATIVE && after > sign.lower) {
         change->threshold = sign.lower;
-        change->behind = apart ? FRICTION_NEUTRAL : FRICTION_POSITIVE;
+        change->mode_after = apart ? FRICTION_NEUTRAL : FRICTION_POSITIVE;
     } else if (mode == FRICTION_NEUTRAL && apart && after > sign.upper) {
         change->threshold = sign.upper;
-        change->behind = FRICTION_POSITIVE;
+        change->mode_after = FRICTION_POSITIVE;
     } else if (mode == FRICTION_NEUTRAL && apart && after < sign.lower) {
         change->threshold = sign.lower;
-        change->behind = FRICTION_NEGATIVE;
+        change->mode_after = FRICTION_NEGATIVE;
     } else {
         return false;
     }
@@ -381,14 +381,14 @@ static void step(const struct model *model, struct vector *state, enum friction_
     }
 
     struct vector at = runge_kutta_4(model, state, step_s * change.fraction, injection, mode);
-    enum friction_mode behind = change.behind;
+    enum friction_mode mode_after = change.mode_after;
     if (change.has_threshold) {
         at.x[friction_argument(model)] = change.threshold;
         if (can_stick(model, injection))
-            behind = mode_at_rest(model, &at, injection);
+            mode_after = mode_at_rest(model, &at, injection);
     }
-    *state = runge_kutta_4(model, &at, step_s * (1.0f - change.fraction), injection, behind);
-    *friction = behind;
+    *state = runge_kutta_4(model, &at, step_s * (1.0f - change.fraction), injection, mode_after);
+    *friction = mode_after;
 }
 
 /* Set-up. */
@@ -411,10 +411,10 @@ static void tire_init(struct tire *tire, enum tire_kind kind, struct magic_formu
     tire->magic = magic;
     tire->cubic = cubic(&magic);
     for (int k = 0; k < NODES; k++)
-        tire->nodes[k] = twin_cosf((float)((2 * k + 1) * 3.14159265358979323846 / (2 * NODES)));
+        tire->nodes[k] = reference_cosf((float)((2 * k + 1) * 3.14159265358979323846 / (2 * NODES)));
 }
 
-void twin_model_init(void *memory, const struct twin_choice *choice)
+void reference_model_init(void *memory, const struct reference_choice *choice)
 {
     struct task *task = memory;
     struct model *model = &task->model;
@@ -441,12 +441,12 @@ void twin_model_init(void *memory, const struct twin_choice *choice)
                                                                               0.0f;
 }
 
-size_t twin_model_size(void)
+size_t reference_model_size(void)
 {
     return sizeof(struct task);
 }
 
-void twin_model_set_state(void *memory, const struct twin_state *state)
+void reference_model_set_state(void *memory, const struct reference_state *state)
 {
     struct task *task = memory;
 
@@ -455,7 +455,7 @@ void twin_model_set_state(void *memory, const struct twin_state *state)
     task->friction = state->friction;
 }
 
-void twin_model_state(const void *memory, struct twin_state *state)
+void reference_model_state(const void *memory, struct reference_state *state)
 {
     const struct task *task = memory;
 
@@ -464,10 +464,10 @@ void twin_model_state(const void *memory, struct twin_state *state)
     state->friction = task->friction;
 }
 
-void twin_model_step(void *memory, const void *injection, void *unused)
+void reference_model_step(void *memory, const void *injection, void *unused)
 {
     struct task *task = memory;
-    const struct twin_injection *given = injection;
+    const struct reference_injection *given = injection;
 
     (void)unused;
     step(&task->model, &task->x, &task->friction, task->step_s,

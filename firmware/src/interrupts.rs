@@ -1,0 +1,109 @@
+//! The two tasks as interrupts, whichever program runs in them.
+//!
+//! SysTick is the PWM interrupt, at high priority. Once per control period it pends the PendSV exception, at low priority,
+//! which runs the control task. So the two rates are locked, and the PWM interrupt preempts a control task that is still
+//! at work. Nothing here can panic: the binary `panic-free` proves it at link time.
+
+use crate::board::{Board, Current};
+use crate::{clock, counters, in_loop, jitter, open_loop, tasks};
+use core::cell::Cell;
+use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::scb::SystemHandler;
+use cortex_m_rt::exception;
+use critical_section::Mutex;
+use shared_model::Scenario;
+
+/// The watchdog bites when no model step arrives for this many of its periods, or for this long, ms, if that is longer.
+const WATCHDOG_PERIODS: f32 = 4.0;
+const WATCHDOG_LEAST_MS: u32 = 20;
+/// Priorities as the registers have them; a lower number preempts a higher one.
+const PWM_PRIORITY: u8 = 0x00;
+const CONTROL_PRIORITY: u8 = 0xE0;
+
+static PWM_START: Mutex<Cell<Option<PwmInterrupt>>> = Mutex::new(Cell::new(None));
+static CONTROL_START: Mutex<Cell<Option<ControlInterrupt>>> = Mutex::new(Cell::new(None));
+
+/// The task of the PWM interrupt. By reference: an interrupt that moves a whole task needs the stack for it,
+/// and delays the other for most of a fast PWM's period.
+pub enum PwmInterrupt {
+    /// The vehicle model runs on the ECU.
+    OpenLoop(&'static mut open_loop::PwmInterrupt),
+    /// The ECU steers a vehicle.
+    InLoop(&'static mut in_loop::PwmInterrupt),
+}
+
+/// The task of the control interrupt.
+pub enum ControlInterrupt {
+    /// The vehicle model runs on the ECU.
+    OpenLoop(&'static mut open_loop::ControlInterrupt),
+    /// The ECU steers a vehicle.
+    InLoop(&'static mut in_loop::ControlInterrupt),
+}
+
+/// Starts PWM, interrupts and watchdog; `tasks` makes the tasks of the two interrupts. The control task runs every `tick_s`.
+pub fn start(
+    period: u16,
+    scenario: &Scenario<f32>,
+    tick_s: f32,
+    tasks: impl FnOnce(<Current as Board>::Pwm) -> Option<(PwmInterrupt, ControlInterrupt)>,
+) {
+    let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * tick_s) as u32;
+    let samples_per_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
+    critical_section::with(|_| {
+        // Started once, with a period that the scenario's check allows.
+        let pwm = Current::start_pwm(period).ok();
+        if let Some((pwm, control)) = pwm.and_then(tasks) {
+            hand_over(pwm, control, samples_per_ms);
+        }
+        set_priorities();
+        Current::start_watchdog(timeout_ms.max(WATCHDOG_LEAST_MS));
+    });
+}
+
+/// Hands the tasks to their interrupts, which take them at their first call.
+pub fn hand_over(pwm: PwmInterrupt, control: ControlInterrupt, samples_per_ms: u32) {
+    clock::set_rate(samples_per_ms);
+    critical_section::with(|cs| {
+        PWM_START.borrow(cs).set(Some(pwm));
+        CONTROL_START.borrow(cs).set(Some(control));
+    });
+}
+
+fn set_priorities() {
+    // SAFETY: called once, inside a critical section, so nothing runs at the old priorities meanwhile.
+    unsafe {
+        let mut core = cortex_m::Peripherals::steal();
+        SCB::set_priority(&mut core.SCB, SystemHandler::SysTick, PWM_PRIORITY);
+        SCB::set_priority(&mut core.SCB, SystemHandler::PendSV, CONTROL_PRIORITY);
+    }
+}
+
+#[exception]
+fn SysTick() {
+    static mut INTERRUPT: Option<PwmInterrupt> = None;
+    let start = Current::cost_counter();
+    if INTERRUPT.is_none() {
+        *INTERRUPT = critical_section::with(|cs| PWM_START.borrow(cs).take());
+    }
+    jitter::record(clock::count_sample(), start);
+    match INTERRUPT {
+        Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
+        Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),
+        None => {}
+    }
+    counters::record_pwm_cost(start);
+}
+
+#[exception]
+fn PendSV() {
+    static mut INTERRUPT: Option<ControlInterrupt> = None;
+    if INTERRUPT.is_none() {
+        *INTERRUPT = critical_section::with(|cs| CONTROL_START.borrow(cs).take());
+    }
+    match INTERRUPT {
+        Some(ControlInterrupt::OpenLoop(interrupt)) => interrupt.run(),
+        Some(ControlInterrupt::InLoop(interrupt)) => interrupt.run(),
+        None => {}
+    }
+    tasks::control_done();
+}
