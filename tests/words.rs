@@ -36,7 +36,7 @@ const RULES: &[Rule] = &[
     Rule {
         phrases: &["so many"],
         instead: "the number of",
-        exempt: &["firmware", "shared-model", "sim-host"],
+        exempt: &["benches", "firmware", "shared-model", "sim-host"],
     },
     Rule {
         phrases: &["as far as"],
