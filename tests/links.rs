@@ -1,0 +1,94 @@
+//! Links between the texts of the repository: the file is there, and so is the heading.
+
+use std::fs;
+use std::process::Command;
+use tests::root;
+
+/// The targets of all links and pictures.
+fn links(text: &str) -> Vec<&str> {
+    let targets = text.split("](").skip(1);
+    let targets = targets.filter_map(|rest| Some(rest.split_once(')')?.0));
+    targets
+        .filter(|target| !target.contains(char::is_whitespace))
+        .collect()
+}
+
+/// A heading's anchor, as GitHub and mdBook make it.
+fn anchor(heading: &str) -> String {
+    let text = heading.trim_start_matches('#').trim().to_lowercase();
+    let kept = text
+        .chars()
+        .filter(|&c| c.is_alphanumeric() || " -_".contains(c));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+fn has_heading(text: &str, wanted: &str) -> bool {
+    let headings = text.lines().filter(|line| line.starts_with('#'));
+    headings.map(anchor).any(|anchor| anchor == wanted)
+}
+
+/// All Markdown files that git tracks.
+fn files() -> Vec<String> {
+    let git = Command::new("git")
+        .args(["ls-files", "*.md"])
+        .current_dir(root())
+        .output()
+        .expect("git starts");
+    assert!(git.status.success(), "git ls-files: {}", git.status);
+    let names = String::from_utf8(git.stdout).expect("names are UTF-8");
+    names.lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let mut broken = Vec::new();
+    let mut checked = 0;
+    for file in files() {
+        let path = root().join(&file);
+        // A tracked file may have been removed and not yet committed.
+        let Ok(text) = fs::read_to_string(&path) else {
+            continue;
+        };
+        for link in links(&text) {
+            if link.starts_with("http") {
+                continue;
+            }
+            checked += 1;
+            let (name, heading) = link.split_once('#').unwrap_or((link, ""));
+            let target = match name {
+                "" => path.clone(),
+                name => path.with_file_name(name),
+            };
+            let is_there = target.exists()
+                && (heading.is_empty()
+                    || fs::read_to_string(&target).is_ok_and(|text| has_heading(&text, heading)));
+            if !is_there {
+                broken.push(format!("{file}: {link}"));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "\n{}", broken.join("\n"));
+    assert!(checked > 20, "the texts have more links than {checked}");
+}
+
+/// A chapter that is not in the table of contents is not in the book.
+#[test]
+fn every_chapter_is_in_the_book() {
+    let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("it is there");
+    let listed = links(&contents);
+    for file in files() {
+        if let Some(chapter) = file.strip_prefix("docs/")
+            && chapter != "SUMMARY.md"
+        {
+            assert!(listed.contains(&chapter), "docs/SUMMARY.md lacks {chapter}");
+        }
+    }
+}
+
+#[test]
+fn anchors_are_those_of_the_headings() {
+    let text = "# One\n## Period, bands and `regions`\n";
+    assert!(has_heading(text, "period-bands-and-regions"));
+    assert!(!has_heading(text, "two"));
+    assert_eq!(links("[a](b.md#c) ![d](e.svg)"), ["b.md#c", "e.svg"]);
+}
