@@ -4,7 +4,7 @@
 pub struct Target {
     /// Its name, and that of its folder in the corpus.
     pub name: &'static str,
-    /// Reads the bytes, and processes the result as far as every command does.
+    /// Reads the bytes, and processes the result up to where every command does.
     pub read: fn(&[u8]),
     /// Repairs checksums and frames; other damage stays.
     pub repair: fn(&mut Vec<u8>),
