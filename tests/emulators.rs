@@ -87,10 +87,13 @@ fn asleep(test: u32) -> String {
 fn exit_code_0_alone_is_no_run() {
     let parts = ["exit code 0", "\"run complete\""];
     let liar = fake("exit 0");
-    assert_could_not_run(run(&liar, &["qemu", &ecu()]), &parts);
-    assert_could_not_run(run(&liar, &["qemu", &ecu(), "telemetry=t.bin"]), &parts);
+    assert_could_not_run(run(&liar, &["firmware", "run", &ecu()]), &parts);
+    assert_could_not_run(
+        run(&liar, &["firmware", "run", &ecu(), "telemetry=t.bin"]),
+        &parts,
+    );
     let garbage = fake("head -c 100000 /dev/urandom; echo run complete; exit 0");
-    assert_could_not_run(run(&garbage, &["qemu", &ecu()]), &parts);
+    assert_could_not_run(run(&garbage, &["firmware", "run", &ecu()]), &parts);
     // In the loop its end comes in the middle of a run.
     let in_loop = ["pil", "--time", "0.1", "--firmware", &ecu()];
     assert_could_not_run(run(&liar, &in_loop), &["left the loop with exit code 0"]);
@@ -100,7 +103,7 @@ fn exit_code_0_alone_is_no_run() {
 fn a_signal_that_ends_the_emulator_is_named() {
     let crash = fake("echo not well >&2; kill -SEGV $$");
     let parts = ["itself failed", "SIGSEGV", "not well"];
-    assert_could_not_run(run(&crash, &["qemu", &ecu()]), &parts);
+    assert_could_not_run(run(&crash, &["firmware", "run", &ecu()]), &parts);
     let in_loop = ["pil", "--time", "0.1", "--firmware", &ecu()];
     assert_could_not_run(run(&crash, &in_loop), &parts);
     let verify = ["verify", "--out", "report", "--firmware", &ecu()];
@@ -119,7 +122,7 @@ fn a_wrapper_whose_child_keeps_the_pipe_is_not_waited_for() {
         let marker = asleep(test);
         let wrapper = fake(&script.replace("$T", &marker));
         let start = Instant::now();
-        let (code, message) = run(&wrapper, &["qemu", "--time-out", "1", &ecu()]);
+        let (code, message) = run(&wrapper, &["firmware", "run", "--time-out", "1", &ecu()]);
         assert!(start.elapsed() < TIME_OUT, "{script}");
         assert_eq!(code, Some(2), "{script}: {message}");
         // A session of its own is beyond the group; it is let go, not waited for.
@@ -150,7 +153,7 @@ fn an_emulator_that_says_nothing_in_the_loop_is_a_time_out() {
 fn a_flood_of_output_takes_little_memory() {
     for flood in ["cat /dev/zero", "yes", "yes | tr '\\n' '\\0'", "yes >&2"] {
         let endless = fake(flood);
-        let mut child = command(&endless, &["qemu", "--time-out", "2", &ecu()])
+        let mut child = command(&endless, &["firmware", "run", "--time-out", "2", &ecu()])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -177,7 +180,7 @@ fn peak_kb(child: &Child) -> Option<u64> {
 #[test]
 fn the_emulator_ends_with_this_program() {
     for (test, arguments) in [
-        (5, vec!["qemu", "IMAGE"]),
+        (5, vec!["firmware", "run", "IMAGE"]),
         (6, vec!["pil", "--time", "1", "--firmware", "IMAGE"]),
     ] {
         for (signal, script) in [
@@ -230,7 +233,8 @@ fn an_image_without_symbols_runs_without_log() {
     bytes[0x30..0x34].fill(0);
     fs::write(real.path().join("stripped"), bytes).expect("it can be written");
     let short = [
-        "qemu",
+        "firmware",
+        "run",
         "--force",
         "stripped",
         "run.duration_s=0.1",
@@ -273,7 +277,14 @@ fn what_is_no_setting_is_refused_before_anything_starts() {
         ("run.duration_s=1 x=2", "no blanks"),
     ] {
         let folder = fake(&format!("touch {marker}; exit 0"));
-        let arguments = ["qemu", &ecu(), "run.sideslip_rad=0.1", setting, "5"];
+        let arguments = [
+            "firmware",
+            "run",
+            &ecu(),
+            "run.sideslip_rad=0.1",
+            setting,
+            "5",
+        ];
         assert_could_not_run(run(&folder, &arguments), &[part, setting]);
         assert!(!started(&folder), "{setting}: it was started");
     }

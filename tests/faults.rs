@@ -71,7 +71,7 @@ fn the_runner_says_that_a_firmware_hangs_and_passes_exit_codes_on() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let drill = |arguments: &[&str]| {
         let output = Command::new(sim_host())
-            .args(["qemu", "--time-out", "2"])
+            .args(["firmware", "run", "--time-out", "2"])
             .arg(image("fault-drill").path)
             .args(arguments)
             .current_dir(folder.path())

@@ -267,16 +267,19 @@ const COMMANDS: [&str; 24] = [
     "realisability",
     "faults",
     "config",
-    "decode",
-    "image",
-    "qemu",
+    "firmware image",
+    "firmware run",
+    "firmware decode",
 ];
 
 #[test]
 fn help_has_examples() {
     let folder = folder();
     for name in COMMANDS {
-        let help = assert_ends(&mut command(folder.path(), [name, "--help"]), 0);
+        let help = assert_ends(
+            &mut command(folder.path(), name.split(' ').chain(["--help"])),
+            0,
+        );
         let text = String::from_utf8_lossy(&help.stdout);
         assert!(
             text.contains("Example") && text.contains(&format!("sim-host {name}")),
@@ -290,8 +293,8 @@ fn help_has_examples() {
 fn images_are_checked() {
     let folder = folder();
     fs::write(folder.path().join("text"), "not an image").expect("the file can be written");
-    for command in [["qemu"].as_slice(), &["verify", "--firmware"]] {
-        let with = |image| [command, &[image]].concat();
+    for command in [["firmware", "run"], ["verify", "--firmware"]] {
+        let with = |image| [command.as_slice(), &[image]].concat();
         assert_refused(
             folder.path(),
             with("missing"),
@@ -325,7 +328,7 @@ fn arm_elf(folder: &Path) -> PathBuf {
 fn a_missing_emulator_is_said() {
     let folder = folder();
     let image = arm_elf(folder.path());
-    let mut command = command(folder.path(), ["qemu"]);
+    let mut command = command(folder.path(), ["firmware", "run"]);
     let output = assert_ends(command.arg(image).env("PATH", folder.path()), 2);
     let message = String::from_utf8_lossy(&output.stderr);
     assert!(
@@ -416,7 +419,7 @@ fn damaged_telemetry_is_refused() {
     let folder = folder();
     let path = folder.path().join("t.bin");
     let whole = telemetry();
-    let decode = ["decode", "t.bin", "--out", "t.csv"];
+    let decode = ["firmware", "decode", "t.bin", "--out", "t.csv"];
     for length in 0..whole.len() {
         fs::write(&path, &whole[..length]).expect("the file can be written");
         assert_refused(
@@ -432,7 +435,11 @@ fn damaged_telemetry_is_refused() {
         assert_refused(folder.path(), decode, &["telemetry is"]);
     }
     assert!(!folder.path().join("t.csv").exists(), "nothing is written");
-    assert_refused(folder.path(), ["decode", "none.bin"], &["none.bin"]);
+    assert_refused(
+        folder.path(),
+        ["firmware", "decode", "none.bin"],
+        &["none.bin"],
+    );
     // Whole, with check sums that fit, and no duty code a step.
     let parts = ["samples_per_step = 0", "from 1 to 1000"];
     fs::write(&path, telemetry_of(&[])).expect("the file can be written");

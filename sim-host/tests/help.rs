@@ -9,7 +9,13 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// Subcommands whose examples need QEMU or what was made in it.
-const WITH_FIRMWARE: [&str; 5] = ["verify", "pil", "decode", "image", "qemu"];
+const WITH_FIRMWARE: [&str; 5] = [
+    "verify",
+    "pil",
+    "firmware image",
+    "firmware run",
+    "firmware decode",
+];
 /// Where the firmware's images are.
 const IMAGES: &str = "thumbv7em-none-eabihf";
 /// Examples of 15 s of work and more.
@@ -34,15 +40,12 @@ fn help(at: &Path, arguments: &[&str], columns: &str) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// The names in the list of commands.
-fn subcommands(at: &Path) -> Vec<String> {
-    let help = help(at, &["--help"], "200");
-    let list = help
-        .split("Commands:\n")
-        .nth(1)
-        .expect("a list of commands");
-    let lines = list.lines().take_while(|line| !line.is_empty());
-    let names = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+/// The names in a list of commands.
+fn listed(help: &str, from: &str, to: &str) -> Vec<String> {
+    let list = help.split(from).nth(1).expect("a list of commands");
+    let list = list.split(to).next().unwrap_or_default();
+    let is_name = |line: &&str| line.starts_with("  ") && !line.starts_with("   ");
+    let names = list.lines().filter(is_name);
     let names = names.filter_map(|line| line.split_whitespace().next());
     names
         .filter(|name| *name != "help")
@@ -50,9 +53,30 @@ fn subcommands(at: &Path) -> Vec<String> {
         .collect()
 }
 
+/// All subcommands, those of `firmware` with its name.
+fn subcommands(at: &Path) -> Vec<String> {
+    let all = listed(&help(at, &["--help"], "200"), "Verification", "Options:");
+    let expanded = |name: String| match name.as_str() {
+        "firmware" => {
+            let tools = listed(
+                &help(at, &["firmware", "--help"], "200"),
+                "Commands:",
+                "Options:",
+            );
+            tools
+                .iter()
+                .map(|tool| format!("firmware {tool}"))
+                .collect()
+        }
+        _ => vec![name],
+    };
+    all.into_iter().flat_map(expanded).collect()
+}
+
 /// The examples of a subcommand, each on one line.
 fn examples(at: &Path, subcommand: &str, columns: &str) -> Vec<String> {
-    let help = help(at, &[subcommand, "--help"], columns);
+    let words = subcommand.split(' ').chain(["--help"]);
+    let help = help(at, &words.collect::<Vec<_>>(), columns);
     let after = help
         .lines()
         .skip_while(|line| !line.starts_with("Examples"));

@@ -1,7 +1,8 @@
 //! `sim-host averaging`: the true dither signal against the averaged system.
 
+use super::options::RunOptions;
+use super::outcome::Outcome;
 use super::output::Destinations;
-use super::{Done, RunOptions};
 use anyhow::ensure;
 use dynamics::averaging::{Comparison, compare};
 use dynamics::words::Short;
@@ -36,7 +37,7 @@ pub struct Arguments {
 const FREQUENCIES_RAD_PER_S: std::ops::RangeInclusive<f64> = 50.0..=100_000.0;
 const POINTS: std::ops::RangeInclusive<u32> = 1..=200;
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let (from, to, points) = (arguments.from, arguments.to, arguments.points);
     let allowed = &FREQUENCIES_RAD_PER_S;
     ensure!(
@@ -71,7 +72,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments
         .destinations
         .write(&comparisons, &comparisons, || chart(&comparisons).svg())?;
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 /// Frequencies that are evenly spaced in their logarithm, both ends among them.

@@ -1,8 +1,9 @@
 //! `sim-host basin`: which start ends on which attractor.
 
+use super::options::RunOptions;
+use super::outcome::Outcome;
 use super::output::Destinations;
 use super::sweep::{TransientOptions, check_interrupted, large_dots, side_by_side, with_progress};
-use super::{Done, RunOptions};
 use dynamics::attractor::{Attractor, Kind};
 use dynamics::basin::{Basin, Cell, basin};
 use dynamics::sweep::{Timing, Values};
@@ -85,7 +86,7 @@ struct Row {
     kind: String,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     let (from, to) = (arguments.beta_from, arguments.beta_to);
     let betas = Values::new("sideslip angle (rad)", from, to, arguments.beta_step)?;
@@ -122,7 +123,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         );
     }
     check_interrupted(basin.cells.len(), runs)?;
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 /// Kind and place.

@@ -1,6 +1,7 @@
 //! `sim-host config`: the complete configuration.
 
-use super::{ConfigOptions, Done};
+use super::options::ConfigOptions;
+use super::outcome::Outcome;
 use dynamics::config::{to_commented_toml, validate};
 
 /// Print a complete configuration as TOML, checked. Names carry their units; comments show the allowed values.
@@ -14,9 +15,9 @@ pub struct Arguments {
     config: ConfigOptions,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
     say!("{}", to_commented_toml(&scenario).trim_end());
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }

@@ -1,7 +1,8 @@
 //! `sim-host convergence`: the fixed step against the reference integrator.
 
+use super::options::RunOptions;
+use super::outcome::Outcome;
 use super::output::Destinations;
-use super::{Done, RunOptions};
 use anyhow::ensure;
 use dynamics::convergence::{Error, errors};
 use dynamics::words::Short;
@@ -26,7 +27,7 @@ pub struct Arguments {
 const TIME_S: f64 = 4.0;
 const TIMES_S: std::ops::RangeInclusive<f64> = 0.01..=60.0;
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     let time_s = arguments.run.time.unwrap_or(TIME_S);
     ensure!(
@@ -48,7 +49,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments
         .destinations
         .write(&errors, &errors, || chart(&errors, time_s).svg())?;
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 fn chart(errors: &[Error], time_s: f64) -> Chart {

@@ -1,8 +1,9 @@
 //! `sim-host equilibria`: equilibria, their eigenvalues, and Hopf bifurcations.
 
+use super::options::RunOptions;
+use super::outcome::Outcome;
 use super::output::Destinations;
 use super::sweep::{SpeedRange, check_interrupted, large_dots, with_progress};
-use super::{Done, RunOptions};
 use anyhow::{bail, ensure};
 use dynamics::eigenvalues::Eigenvalue;
 use dynamics::equilibria::{Equilibrium, Hopf, hopf, over_speed};
@@ -95,7 +96,7 @@ impl Row {
     }
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     if let Some(time_s) = arguments.run.time {
         bail!("--time {time_s}: equilibria are solved for, not run to; leave it out");
@@ -128,7 +129,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         .write(rows, &results, || chart(&results).svg())?;
     show(&results);
     check_interrupted(results.speeds.len(), values.count())?;
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 fn show(results: &Results) {

@@ -1,8 +1,9 @@
 //! `sim-host faults`: faults on purpose, and whether any of them stays unfound.
 
 use super::emulator::open_image;
+use super::options::time_out;
+use super::outcome::Outcome;
 use super::output::{Destinations, named};
-use super::{Done, time_out};
 use clap::Args;
 use dynamics::words::counted;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -56,7 +57,7 @@ struct Results<'a> {
     rows: &'a [Row],
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let firmware = named("--firmware", &arguments.firmware);
     arguments.destinations.check(firmware)?;
     let limit = time_out(arguments.time_out)?;
@@ -78,9 +79,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     arguments.destinations.write(&rows, &results, figure)?;
     let is_unlisted = rows.iter().any(Row::is_unlisted);
     Ok(if is_unlisted {
-        Done::Failed
+        Outcome::Failed
     } else {
-        Done::Well
+        Outcome::Success
     })
 }
 

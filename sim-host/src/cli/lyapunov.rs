@@ -1,8 +1,9 @@
 //! `sim-host lyapunov`: Lyapunov exponents over the wheel speed.
 
+use super::options::RunOptions;
+use super::outcome::{COULD_NOT_RUN, Outcome};
 use super::output::Destinations;
 use super::sweep::SpeedRange;
-use super::{COULD_NOT_RUN, Done, RunOptions};
 use anyhow::ensure;
 use clap::ValueEnum;
 use dynamics::flow::{Flow, VehicleFlow};
@@ -90,7 +91,7 @@ struct Results<'a> {
     exponents: &'a [Estimate],
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenarios = speeds(arguments)?;
     let timing = timing(arguments)?;
     let search = Search {
@@ -120,9 +121,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             "stopped after {done} of {}; their results are shown, and written where files were asked for",
             counted(points, "point")
         );
-        return Ok(Done::Code(COULD_NOT_RUN));
+        return Ok(Outcome::Code(COULD_NOT_RUN));
     }
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 /// One scenario for each speed, checked.

@@ -1,8 +1,9 @@
 //! `sim-host map`: exponent, period and extent of the motion over wheel speed and dither amplitude.
 
 use super::grid::{GridOptions, TimeOptions};
+use super::options::ConfigOptions;
+use super::outcome::Outcome;
 use super::output::{Named, check, named};
-use super::{ConfigOptions, Done};
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use dynamics::config::validate;
@@ -135,7 +136,7 @@ struct Files {
     force: bool,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(Action::Merge(merge)) = &arguments.command {
         return merge.run();
     }
@@ -156,7 +157,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     }
     if arguments.shard.is_some() {
         say!("the shard is complete: {}", work.display());
-        return Ok(Done::Well);
+        return Ok(Outcome::Success);
     }
     let cells = put_together(&[folder])?;
     arguments.files.write(&plan, &cells)?;
@@ -165,7 +166,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         "tiles: {}, to be deleted when no longer needed",
         work.display()
     );
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 /// Makes the missing tiles with progress on a terminal.
@@ -263,7 +264,7 @@ fn grid(
 }
 
 impl Merge {
-    fn run(&self) -> anyhow::Result<Done> {
+    fn run(&self) -> anyhow::Result<Outcome> {
         ensure!(
             self.files.all().next().is_some(),
             "nothing to make: give --out, --parquet or --figure"
@@ -279,7 +280,7 @@ impl Merge {
         let cells = put_together(&folders)?;
         self.files.write(&plan, &cells)?;
         show(&plan, &cells);
-        Ok(Done::Well)
+        Ok(Outcome::Success)
     }
 }
 

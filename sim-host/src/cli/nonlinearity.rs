@@ -1,8 +1,9 @@
 //! `sim-host nonlinearity`: what dither makes of the nonlinearities.
 
+use super::options::{ConfigOptions, waveform};
+use super::outcome::Outcome;
 use super::output::Destinations;
 use super::tires::greatest_angle;
-use super::{ConfigOptions, Done, waveform};
 use anyhow::ensure;
 use dynamics::characteristics::{NonlinearityRow, nonlinearities, nonlinearities_chart};
 use dynamics::config::validate;
@@ -46,7 +47,7 @@ struct Results<'a> {
     nonlinearities: &'a [NonlinearityRow],
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut scenario = arguments.config.load()?;
     let dither = &mut scenario.dither;
     dither.waveform = arguments.dither.unwrap_or(dither.waveform);
@@ -75,5 +76,5 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         dither.waveform,
         dither.amplitude_v
     );
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }

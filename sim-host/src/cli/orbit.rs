@@ -1,13 +1,14 @@
 //! `sim-host orbit`: the orbit diagram.
 
+use super::options::RunOptions;
+use super::outcome::Outcome;
 use super::output::Destinations;
 use super::sweep::{
     RangeOptions, TransientOptions, check_interrupted, paper_regions, side_by_side, with_progress,
 };
-use super::{Done, RunOptions};
 use clap::ValueEnum;
 use dynamics::component::Component;
-use dynamics::orbit::{Outcome, Point, Section, Start, diagram};
+use dynamics::orbit::{self, Point, Section, Start, diagram};
 use dynamics::sweep::{Parameter, Timing};
 use dynamics::words::counted;
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
@@ -116,7 +117,7 @@ struct Row {
     diverges_at_s: Option<f64>,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     let parameter = arguments.range.parameter();
     let values = arguments.range.values(&scenario)?;
@@ -154,7 +155,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         .write(rows, &results, || chart(&results).svg())?;
     say!("{}", summary(&results));
     check_interrupted(points.len(), values.count())?;
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 fn rows(
@@ -173,25 +174,26 @@ fn rows(
         diverges_at_s,
     };
     match &point.orbit {
-        Outcome::Meets { values } => {
+        orbit::Outcome::Meets { values } => {
             let meeting = |&value: &f64| row("meets", Some(value), None);
             values.iter().map(meeting).collect()
         }
-        Outcome::Misses => vec![row("misses", None, None)],
-        Outcome::Rests { value } => vec![row("rests", Some(*value), None)],
-        Outcome::Diverges { time_s } => vec![row("diverges", None, Some(*time_s))],
-        Outcome::NotFollowed(_) => vec![row("not_followed", None, None)],
+        orbit::Outcome::Misses => vec![row("misses", None, None)],
+        orbit::Outcome::Rests { value } => vec![row("rests", Some(*value), None)],
+        orbit::Outcome::Diverges { time_s } => vec![row("diverges", None, Some(*time_s))],
+        orbit::Outcome::NotFollowed(_) => vec![row("not_followed", None, None)],
     }
 }
 
 fn summary(results: &Results) -> String {
-    let count = |is: fn(&Outcome) -> bool| results.points.iter().filter(|p| is(&p.orbit)).count();
-    let met = count(|o| matches!(o, Outcome::Meets { .. }));
-    let rests = count(|o| matches!(o, Outcome::Rests { .. }));
-    let misses = count(|o| matches!(o, Outcome::Misses));
-    let diverges = count(|o| matches!(o, Outcome::Diverges { .. }));
+    let count =
+        |is: fn(&orbit::Outcome) -> bool| results.points.iter().filter(|p| is(&p.orbit)).count();
+    let met = count(|o| matches!(o, orbit::Outcome::Meets { .. }));
+    let rests = count(|o| matches!(o, orbit::Outcome::Rests { .. }));
+    let misses = count(|o| matches!(o, orbit::Outcome::Misses));
+    let diverges = count(|o| matches!(o, orbit::Outcome::Diverges { .. }));
     let not_followed = results.points.iter().find_map(|point| match point.orbit {
-        Outcome::NotFollowed(end) => Some(format!("; at {}: {end}", point.value)),
+        orbit::Outcome::NotFollowed(end) => Some(format!("; at {}: {end}", point.value)),
         _ => None,
     });
     format!(
@@ -206,9 +208,11 @@ fn chart(results: &Results) -> Chart {
     let points = |point: &Point| -> Vec<(f64, f64)> {
         let at = |&value: &f64| (point.value, value);
         match &point.orbit {
-            Outcome::Meets { values } => values.iter().map(at).collect(),
-            Outcome::Rests { value } => vec![(point.value, *value)],
-            Outcome::Misses | Outcome::Diverges { .. } | Outcome::NotFollowed(_) => Vec::new(),
+            orbit::Outcome::Meets { values } => values.iter().map(at).collect(),
+            orbit::Outcome::Rests { value } => vec![(point.value, *value)],
+            orbit::Outcome::Misses
+            | orbit::Outcome::Diverges { .. }
+            | orbit::Outcome::NotFollowed(_) => Vec::new(),
         }
     };
     let (name, shown) = (results.parameter.name(), results.shown.label());

@@ -1,6 +1,6 @@
 //! `sim-host phase`: phase portrait of the settled motion.
 
-use super::Done;
+use super::outcome::Outcome;
 use super::output::Destinations;
 use super::settled::{SettledRun, title};
 use dynamics::component::{Component, panel_of_states};
@@ -50,7 +50,7 @@ struct Results<'a> {
     states: &'a [Row],
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     let (x, y) = (arguments.x, arguments.y);
     anyhow::ensure!(
@@ -91,5 +91,5 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     for (component, (low, high)) in [(x, results.x_range), (y, results.y_range)] {
         say!("{component}: from {low} to {high} {}", component.unit);
     }
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }

@@ -1,8 +1,9 @@
 //! `sim-host pil`: manoeuvres with the ECU in the loop.
 
 use super::emulator::{link_kinds, machines, open_image};
+use super::options::{time_out, waveform};
+use super::outcome::Outcome;
 use super::output::{Destinations, check, named};
-use super::{Done, time_out, waveform};
 use anyhow::{Context, ensure};
 use dynamics::config::validate;
 use dynamics::words::{counted, counted_as};
@@ -82,7 +83,7 @@ pub struct Arguments {
 
 const USUAL: &str = include_str!("../../examples/manoeuvres/constant-speed.toml");
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(file) = &arguments.replay {
         return replay(file);
     }
@@ -109,9 +110,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     }
     show(&driven, arguments.link);
     Ok(if driven.iter().all(|summary| summary.agree) {
-        Done::Well
+        Outcome::Success
     } else {
-        Done::Failed
+        Outcome::Failed
     })
 }
 
@@ -311,7 +312,7 @@ fn words(comparison: &Comparison) -> String {
     }
 }
 
-fn replay(file: &Path) -> anyhow::Result<Done> {
+fn replay(file: &Path) -> anyhow::Result<Outcome> {
     let name = file.display();
     let is_start = |start: &[u8]| start.starts_with(MAGIC);
     let bytes = input::read(file, input::RECORDING_BYTES, is_start)
@@ -326,8 +327,8 @@ fn replay(file: &Path) -> anyhow::Result<Done> {
         words(&comparison)
     );
     Ok(if comparison.is_equal() {
-        Done::Well
+        Outcome::Success
     } else {
-        Done::Failed
+        Outcome::Failed
     })
 }

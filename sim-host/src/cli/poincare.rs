@@ -1,6 +1,6 @@
 //! `sim-host poincare`: Poincaré section of the settled motion.
 
-use super::Done;
+use super::outcome::Outcome;
 use super::output::Destinations;
 use super::settled::{SettledRun, title};
 use anyhow::{Context, ensure};
@@ -115,7 +115,7 @@ impl Arguments {
     }
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     let (x, y) = arguments.axes()?;
     if let Some(at) = arguments.at {
@@ -173,5 +173,5 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     if let Some(time_s) = results.mean_return_time_s {
         say!("mean time between them {time_s:.6} s");
     }
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }

@@ -1,7 +1,8 @@
 //! `sim-host realisability`: what a steering actuator can produce of the dither.
 
+use super::options::ConfigOptions;
+use super::outcome::Outcome;
 use super::output::Destinations;
-use super::{ConfigOptions, Done};
 use anyhow::ensure;
 use dynamics::config::validate;
 use dynamics::realisability::{Amplitudes, Demand, Response, bode_chart, demands, responses};
@@ -47,7 +48,7 @@ struct Results<'a> {
     responses: &'a [Response],
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
     for (option, volts) in [
@@ -79,7 +80,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     for demand in &results.demands {
         say!("{}", sentence(demand));
     }
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 fn sentence(demand: &Demand) -> String {

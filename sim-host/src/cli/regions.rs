@@ -1,10 +1,11 @@
 //! `sim-host regions`: kinds of motion along a sweep, and the edges between them.
 
+use super::options::RunOptions;
+use super::outcome::Outcome;
 use super::output::Destinations;
 use super::sweep::{
     RangeOptions, TransientOptions, check_interrupted, paper_regions, side_by_side, with_progress,
 };
-use super::{Done, RunOptions};
 use anyhow::ensure;
 use dynamics::regions::{Regions, Sample, coexisting, regions};
 use dynamics::sweep::{Parameter, Timing, mirrored};
@@ -80,7 +81,7 @@ struct Row<'a> {
     diverges_at_s: Option<f64>,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     let parameter = arguments.range.parameter();
     let values = arguments.range.values(&scenario)?;
@@ -122,7 +123,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     show(&results);
     let done = results.sweeps.iter().map(|s| s.found.samples.len()).sum();
     check_interrupted(done, runs.max(done))?;
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 fn row<'a>(

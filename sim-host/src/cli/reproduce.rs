@@ -1,6 +1,6 @@
 //! `sim-host reproduce`: the paper's figures and claims.
 
-use super::Done;
+use super::outcome::Outcome;
 use super::output::{check, named};
 use dynamics::config::validate;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -34,7 +34,7 @@ pub struct Arguments {
     force: bool,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let options = Options {
         quality: if arguments.quick {
             Quality::Quick
@@ -90,7 +90,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         page.display(),
         start.elapsed().as_secs_f64()
     );
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 /// Refuses a folder with other files, which those of a reproduction might overwrite.
@@ -118,7 +118,7 @@ fn time_left(elapsed: Duration, done: f64) -> String {
 
 fn scenarios(arguments: &Arguments) -> anyhow::Result<Vec<(String, Scenario<f64>)>> {
     if let Some(file) = &arguments.config {
-        let scenario = super::load_file(file, None)?;
+        let scenario = super::options::load_file(file, None)?;
         validate(&scenario)?;
         let stem = file.file_stem().unwrap_or_default().to_string_lossy();
         let plain = |c: char| {

@@ -1,9 +1,10 @@
 //! `sim-host schedule`: the amplitude of dither that each wheel speed needs, as the table that the ECU carries.
 
 use super::grid::{GridOptions, TimeOptions};
+use super::options::ConfigOptions;
+use super::outcome::Outcome;
 use super::output::{check, named};
 use super::sweep::with_progress;
-use super::{ConfigOptions, Done};
 use anyhow::{Context, anyhow, bail, ensure};
 use dynamics::config::{differences, validate};
 use dynamics::map::cell::Cell as MapCell;
@@ -110,7 +111,7 @@ struct Row {
     kind_from_mirrored_start: String,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
     let plans = [
@@ -145,9 +146,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     analyses.iter().for_each(show);
     let good = |a: &Analysis| a.hopeless_rpm().is_empty() && a.failed_checks().next().is_none();
     Ok(if analyses.iter().all(good) {
-        Done::Well
+        Outcome::Success
     } else {
-        Done::Failed
+        Outcome::Failed
     })
 }
 

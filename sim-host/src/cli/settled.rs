@@ -1,7 +1,7 @@
 //! What the plots of a settled motion share: their options, and the motion behind its transient.
 
-use super::RunOptions;
-use super::advice;
+use super::options::RunOptions;
+use super::options::advice;
 use super::output::Named;
 use anyhow::{bail, ensure};
 use clap::Args;

@@ -1,7 +1,8 @@
 //! `sim-host simulate`: one run on the host, as CSV.
 
+use super::options::{RunOptions, advice};
+use super::outcome::Outcome;
 use super::output::check;
-use super::{Done, RunOptions, advice};
 use anyhow::bail;
 use dynamics::simulate::{early_end, simulate};
 use dynamics::trace::Trace;
@@ -31,7 +32,7 @@ pub struct Arguments {
     force: bool,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     let out = Some(("--out", arguments.out.as_path()));
     check(arguments.run.config.input(), [out], arguments.force)?;
@@ -50,7 +51,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         trace.time_s(trace.states.len() - 1),
         arguments.out.display()
     );
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 /// Writes a trace as CSV, one row a model step; the duty code is that of the step's last PWM period.

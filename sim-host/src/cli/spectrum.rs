@@ -1,6 +1,6 @@
 //! `sim-host spectrum`: power spectrum of the settled motion.
 
-use super::Done;
+use super::outcome::Outcome;
 use super::output::Destinations;
 use super::settled::{SettledRun, title};
 use anyhow::{Context, ensure};
@@ -87,7 +87,7 @@ impl Arguments {
     }
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let mut scenario = arguments.run.scenario()?;
     let dithered = scenario.dither.waveform != Waveform::None;
     if dithered {
@@ -128,7 +128,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             line.over_surroundings
         );
     }
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 fn results(

@@ -1,6 +1,6 @@
 //! What the subcommands share that make many runs: range, times, cost, progress and the end by Ctrl-C.
 
-use super::RunOptions;
+use super::options::RunOptions;
 use anyhow::{bail, ensure};
 use clap::{Args, ValueEnum};
 use dynamics::observe::observe;

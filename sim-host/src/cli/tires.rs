@@ -1,7 +1,8 @@
 //! `sim-host tires`: cornering force of the tyres.
 
+use super::options::ConfigOptions;
+use super::outcome::Outcome;
 use super::output::Destinations;
-use super::{ConfigOptions, Done};
 use anyhow::ensure;
 use dynamics::characteristics::{TireRow, tires, tires_chart};
 use dynamics::config::validate;
@@ -37,7 +38,7 @@ struct Results<'a> {
     forces: &'a [TireRow],
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
     let slip_max_rad = greatest_angle("--slip-max", arguments.slip_max)?;
@@ -64,7 +65,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
             );
         }
     }
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }
 
 /// The end of an axis of angles, checked.

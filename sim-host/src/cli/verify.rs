@@ -1,8 +1,9 @@
 //! `sim-host verify`: the main job.
 
 use super::emulator::open_image;
+use super::options::{ConfigOptions, time_out};
+use super::outcome::Outcome;
 use super::output::check;
-use super::{ConfigOptions, Done, time_out};
 use anyhow::ensure;
 use dynamics::config::validate;
 use dynamics::words::Short;
@@ -66,7 +67,7 @@ pub struct Arguments {
 /// Shorter runs hold too few cycles for a period and an exponent.
 const DURATIONS_S: std::ops::RangeInclusive<f64> = 60.0..=3600.0;
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let duration_s = arguments.duration_s;
     ensure!(
         DURATIONS_S.contains(&duration_s),
@@ -93,9 +94,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     write_report(&arguments.out, &verification, &proofs)?;
     show(&verification, &arguments.out, start.elapsed());
     Ok(if verification.verdict.passed() {
-        Done::Well
+        Outcome::Success
     } else {
-        Done::Failed
+        Outcome::Failed
     })
 }
 

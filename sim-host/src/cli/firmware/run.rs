@@ -1,8 +1,8 @@
-//! `sim-host qemu`: the cargo runner of the firmware.
+//! `sim-host firmware run`: the cargo runner of the firmware.
 
-use super::Done;
-use super::emulator::{machines, open_image};
-use super::output::check;
+use crate::cli::emulator::{machines, open_image};
+use crate::cli::outcome::Outcome;
+use crate::cli::output::check;
 use anyhow::{Context, anyhow, ensure};
 use dynamics::config;
 use qemu::Machine;
@@ -18,11 +18,11 @@ use toml::{Table, Value};
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples (cargo runs this from firmware/: `cargo run -- SETTINGS`):
-  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+  sim-host firmware run target/thumbv7em-none-eabihf/firmware/ecu \\
       run.wheel_speed_rpm=1600
-  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+  sim-host firmware run target/thumbv7em-none-eabihf/firmware/ecu \\
       dither.waveform=sine dither.amplitude_v=1 telemetry=run.bin
-  sim-host qemu --machine mps2-an500 --time-out 60 \\
+  sim-host firmware run --machine mps2-an500 --time-out 60 \\
       target/thumbv7em-none-eabihf/firmware/ecu run.duration_s=5
 
 Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME and telemetry=FILE.
@@ -50,8 +50,8 @@ pub struct Arguments {
 const OWN_KEYS: [&str; 2] = [TELEMETRY, "fault="];
 const TELEMETRY: &str = "telemetry=";
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
-    let time_out = super::time_out(arguments.time_out)?;
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let time_out = crate::cli::options::time_out(arguments.time_out)?;
     check_settings(&arguments.settings)?;
     let image = open_image(&arguments.image)?;
     let decoder = LogDecoder::new(&image)?;
@@ -87,8 +87,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     } else if let Some(file) = telemetry(arguments) {
         check_telemetry(file, before)?;
     }
-    Ok(Done::Code(
-        u8::try_from(code).unwrap_or(super::COULD_NOT_RUN),
+    Ok(Outcome::Code(
+        u8::try_from(code).unwrap_or(crate::cli::outcome::COULD_NOT_RUN),
     ))
 }
 
@@ -98,7 +98,7 @@ fn check_settings(settings: &[String]) -> anyhow::Result<()> {
     for setting in settings {
         ensure!(
             !setting.starts_with('-'),
-            "{setting}: options go before the image: sim-host qemu [OPTIONS] IMAGE [KEY=VALUE]..."
+            "{setting}: options go before the image: sim-host firmware run [OPTIONS] IMAGE [KEY=VALUE]..."
         );
         ensure!(
             !setting.contains(char::is_whitespace),

@@ -1,7 +1,8 @@
-//! `sim-host decode`: the firmware's telemetry as CSV.
+//! `sim-host firmware decode`: the firmware's telemetry as CSV.
 
-use super::output::{check, named};
-use super::{Done, simulate};
+use crate::cli::outcome::Outcome;
+use crate::cli::output::{check, named};
+use crate::cli::simulate;
 use dynamics::words::counted;
 use pil::equivalence::trace_of;
 use qemu::meaning;
@@ -11,9 +12,9 @@ use std::path::PathBuf;
 /// Check a telemetry file of the firmware, say how its run ended, and write its motion as CSV.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host qemu target/thumbv7em-none-eabihf/firmware/ecu \\
+  sim-host firmware run target/thumbv7em-none-eabihf/firmware/ecu \\
       telemetry=decode.bin run.duration_s=5
-  sim-host decode decode.bin --out decode.csv")]
+  sim-host firmware decode decode.bin --out decode.csv")]
 pub struct Arguments {
     /// Telemetry file
     telemetry: PathBuf,
@@ -25,7 +26,7 @@ pub struct Arguments {
     force: bool,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let input = ("the telemetry", arguments.telemetry.as_path());
     check([input], [named("--out", &arguments.out)], arguments.force)?;
     let recording = Recording::open(&arguments.telemetry)?;
@@ -45,5 +46,5 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
     if let Some(out) = &arguments.out {
         simulate::write(&trace_of(&recording), out, arguments.force)?;
     }
-    Ok(Done::Well)
+    Ok(Outcome::Success)
 }

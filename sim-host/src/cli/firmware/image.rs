@@ -1,8 +1,8 @@
-//! `sim-host image`: what a firmware image needs of its board, and how deep its stack can get.
+//! `sim-host firmware image`: what a firmware image needs of its board, and how deep its stack can get.
 
-use super::Done;
-use super::emulator::open_image;
-use super::output::{check, named};
+use crate::cli::emulator::open_image;
+use crate::cli::outcome::Outcome;
+use crate::cli::output::{check, named};
 use dynamics::words::counted;
 use files::output::write_json;
 use image::Image;
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   cargo xtask proofs
-  sim-host image --json stack.json \\
+  sim-host firmware image --json stack.json \\
       target/stack-sizes/mps2/thumbv7em-none-eabihf/firmware/ecu
 
 Exit code 1 if there is no bound (recursion, unknown frames), or less RAM than it takes.")]
@@ -41,7 +41,7 @@ struct Results<'a> {
     stack: &'a Stack,
 }
 
-pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let input = ("the image", arguments.image.as_path());
     check([input], [named("--json", &arguments.json)], arguments.force)?;
     let image = open_image(&arguments.image)?;
@@ -57,9 +57,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Done> {
         write_json(path, &results, arguments.force)?;
     }
     Ok(if stack.fits() {
-        Done::Well
+        Outcome::Success
     } else {
-        Done::Failed
+        Outcome::Failed
     })
 }
 

@@ -1,0 +1,24 @@
+//! `sim-host firmware`: tools for an image of the firmware.
+
+pub mod decode;
+pub mod image;
+pub mod run;
+
+use super::outcome::Outcome;
+use clap::Subcommand;
+
+/// Analyse or run a firmware image, and decode its telemetry.
+#[derive(Subcommand)]
+pub enum Command {
+    Image(image::Arguments),
+    Run(run::Arguments),
+    Decode(decode::Arguments),
+}
+
+pub fn run(command: &Command) -> anyhow::Result<Outcome> {
+    match command {
+        Command::Image(arguments) => image::run(arguments),
+        Command::Run(arguments) => run::run(arguments),
+        Command::Decode(arguments) => decode::run(arguments),
+    }
+}
