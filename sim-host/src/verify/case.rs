@@ -1,6 +1,6 @@
 //! The cases of a verification: which runs there are, and what is measured of each.
 
-use super::{Options, Progress, VerifyError};
+use super::job::{Options, Progress, VerifyError};
 use crate::report::RunReport;
 use dynamics::lyapunov::{self, Exponent};
 use dynamics::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
@@ -19,6 +19,10 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
+
+/// Free f32 and f64 runs of a periodic motion never get this far apart, over the attractor's size: a hundredth of what counts
+/// as parted.
+pub(super) const NEVER_PART: f64 = 1e-3;
 
 /// Transient of the paper's start before a run begins, s.
 const TRANSIENT_S: f64 = 200.0;
@@ -351,7 +355,7 @@ impl Outcome {
             divergence_limit: if horizon_s.is_some() {
                 equivalence::PARTED
             } else {
-                super::checks::NEVER_PART
+                NEVER_PART
             },
             horizon_s,
             instructions: Instructions::of(&self.recording),

@@ -1,6 +1,6 @@
 //! The checks of a verification: the four levels of equivalence, and what the firmware needs.
 
-use super::case::{Analysis, DITHER_TRANSIENT_S, Expected, Outcome, Role};
+use super::case::{Analysis, DITHER_TRANSIENT_S, Expected, NEVER_PART, Outcome, Role};
 use dynamics::period::mean_cycle_s;
 use image::Image;
 use pil::equivalence;
@@ -8,9 +8,6 @@ use pil::instructions::{Instructions, median, most};
 use plot::number::four_digits;
 use plot::verdict::Check;
 
-/// Free f32 and f64 runs of a periodic motion never get this far apart, over the attractor's size: a hundredth of what counts
-/// as parted.
-pub(super) const NEVER_PART: f64 = 1e-3;
 /// What a mid-size microcontroller spares for the ECU's program.
 const STACK_LIMIT_BYTES: f64 = 16.0 * 1024.0;
 const FLASH_LIMIT_BYTES: f64 = 128.0 * 1024.0;
@@ -293,7 +290,7 @@ pub(super) fn notes(image: &Image, outcomes: &[Outcome]) -> Vec<(String, String)
         ),
         (
             "Start of the runs".into(),
-            "behind 200 s of the paper's start without dither, in f64, rounded to f32".into(),
+            "after a 200 s transient from the paper's initial state, without dither, in f64, rounded to f32".into(),
         ),
     ]
 }

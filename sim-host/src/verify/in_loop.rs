@@ -1,7 +1,7 @@
 //! The ECU in the loop: does the firmware command what its program commands on the host, with a vehicle that answers?
 
 use super::checks::load;
-use super::{Options, Progress, VerifyError};
+use super::job::{Options, Progress, VerifyError};
 use crate::report::DriveReport;
 use pil::instructions::Instructions;
 use pil::levels::{Levels, Target, drive};

@@ -1,7 +1,7 @@
 //! What is shown of the firmware itself: how deep its stack can get.
 
-use super::Options;
 use super::case::Outcome;
+use super::job::Options;
 use image::stack::Stack;
 use plot::verdict::Check;
 

@@ -2,7 +2,6 @@
 
 use super::case::{Outcome, Role};
 use super::checks::chaotic;
-use super::find;
 use crate::report::Pair;
 use dynamics::lyapunov::Exponent;
 use dynamics::period::Period;
@@ -186,4 +185,12 @@ fn cycle_s(outcome: &Outcome) -> Option<f64> {
         Period::Periodic { maxima, time_s, .. } => Some(time_s / maxima as f64),
         _ => None,
     }
+}
+
+/// The outcome with the given role.
+fn find(outcomes: &[Outcome], role: Role) -> Option<(usize, &Outcome)> {
+    outcomes
+        .iter()
+        .enumerate()
+        .find(|(_, outcome)| outcome.case.role == role)
 }

@@ -5,7 +5,7 @@ use crate::component::Component;
 use crate::extrema::Extrema;
 use crate::flow::VehicleFlow;
 use crate::lyapunov::{self, SEGMENTS, WARM_UP};
-use crate::poincare::{Direction, Section, Step};
+use crate::section::{Direction, Section, Step};
 use crate::sweep::Timing;
 use engine::Stepper;
 use engine::taylor::{Crossing, Observables, Trajectory};

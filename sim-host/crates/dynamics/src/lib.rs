@@ -24,6 +24,7 @@ pub mod power_spectrum;
 pub mod realisability;
 pub mod regions;
 pub mod schedule;
+pub mod section;
 pub mod simulate;
 pub mod sweep;
 pub mod synchronisation;

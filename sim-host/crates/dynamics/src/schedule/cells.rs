@@ -1,6 +1,6 @@
 //! Kinds of motion over wheel speed N and dither amplitude W.
 
-use super::Plan;
+use super::plan::Plan;
 use crate::attractor::{Attractor, Kind, attractors};
 use crate::sweep::{Parameter, RunControl, SweepError, Timing, mirrored};
 use shared_model::{Scenario, listed};

@@ -1,7 +1,7 @@
 //! The first cells of schedules out of a map over the same grid.
 
-use super::Plan;
 use super::cells::Cell;
+use super::plan::Plan;
 use crate::attractor::Kind;
 use crate::map::cell;
 use crate::map::plan::{Grid, Plan as MapPlan, PlanError, Sheet, Start};

@@ -14,30 +14,18 @@ pub mod check;
 pub mod choose;
 pub mod figure;
 pub mod from_map;
+mod plan;
 pub mod source;
 
-use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
+use crate::sweep::{RunControl, SweepError};
 use cells::{Cell, Column, columns};
 use check::check;
+pub use plan::Plan;
+
 use choose::{Choice, Entry, choose};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::servo::Pwm;
-
-/// What a schedule is made from.
-#[derive(Debug, Clone, Copy)]
-pub struct Plan {
-    /// The wheel speeds of the table, rpm.
-    pub speeds_rpm: Values,
-    /// The amplitudes looked at, V; the first must be 0.
-    pub amplitudes_v: Values,
-    /// Width to which the edges of the ranges of W are bisected, V.
-    pub edge_width_v: f64,
-    /// Share of its range by which an amplitude lies above the least one: 0 to 1.
-    pub margin: f64,
-    /// Times of each run.
-    pub timing: Timing,
-}
 
 /// The schedule of one waveform, with what it comes from.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -71,18 +59,6 @@ impl Analysis {
     /// Checks that a motion of another kind than period one and rest fails.
     pub fn failed_checks(&self) -> impl Iterator<Item = &Cell> {
         self.checks.iter().filter(|cell| !cell.class().is_calm())
-    }
-}
-
-impl Plan {
-    /// Checks that the scenario can be run at every speed and at every amplitude of the plan.
-    ///
-    /// # Errors
-    /// If it cannot, or has no waveform.
-    pub fn validate(&self, scenario: &Scenario<f64>) -> Result<(), SweepError> {
-        scenarios(scenario, Parameter::Amplitude, &self.amplitudes_v)?;
-        scenarios(scenario, Parameter::Speed, &self.speeds_rpm)?;
-        Ok(())
     }
 }
 
