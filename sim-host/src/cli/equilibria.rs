@@ -266,9 +266,9 @@ fn speed_chart(speeds: &[Speed], hopf: &[Hopf]) -> Chart {
     )];
     if !hopf.is_empty() {
         let caption = "growth of the pair of eigenvalues that changes stability";
-        let mut log_stretching = panel(caption, "real part (1/s)", &bifurcating, growth);
-        log_stretching.levels = vec![0.0];
-        panels.push(log_stretching);
+        let mut growths = panel(caption, "real part (1/s)", &bifurcating, growth);
+        growths.levels = vec![0.0];
+        panels.push(growths);
     }
     Chart {
         heading: "Equilibria over wheel speed".into(),
