@@ -4,9 +4,8 @@ use super::options::RunOptions;
 use super::outcome::Outcome;
 use super::output::Destinations;
 use anyhow::ensure;
-use dynamics::averaging::{Comparison, compare};
+use dynamics::averaging::{Comparison, chart, compare};
 use dynamics::words::Short;
-use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::dither::Waveform;
 
 /// The true dither signal against the averaged system, over the dither's frequency: where averaging starts to hold.
@@ -99,28 +98,5 @@ fn show(comparisons: &[Comparison]) {
             percent(comparison.cycle_difference_percent),
             percent(comparison.swing_difference_percent)
         );
-    }
-}
-
-fn chart(comparisons: &[Comparison]) -> Chart {
-    let series = |label: &str, line, value: fn(&Comparison) -> Option<f64>| Series {
-        label: label.into(),
-        points: comparisons
-            .iter()
-            .filter_map(|c| Some((c.frequency_rad_per_s, value(c)?.abs())))
-            .collect(),
-        look: Look::Line(line),
-    };
-    Chart {
-        heading: "Averaging: the true dither signal against the averaged system".into(),
-        panels: vec![Panel {
-            x: AxisSpec::logarithmic("dither frequency (rad/s)"),
-            y: AxisSpec::logarithmic("difference (%)"),
-            series: vec![
-                series("cycle time", 0, |c| c.cycle_difference_percent),
-                series("swing of the yaw rate", 1, |c| c.swing_difference_percent),
-            ],
-            ..Panel::default()
-        }],
     }
 }

@@ -3,12 +3,10 @@
 use super::options::RunOptions;
 use super::outcome::Outcome;
 use super::output::Destinations;
-use super::sweep::{TransientOptions, check_interrupted, large_dots, side_by_side, with_progress};
-use dynamics::attractor::{Attractor, Kind};
-use dynamics::basin::{Basin, Cell, basin};
+use super::sweep::{TransientOptions, check_interrupted, side_by_side, with_progress};
+use dynamics::basin::{Basin, basin, chart};
 use dynamics::sweep::{Timing, Values};
 use dynamics::words::counted;
-use plot::chart::{AxisSpec, Chart, Panel};
 use serde::Serialize;
 
 /// Basins of attraction: which start ends on which attractor, over a grid of sideslip and steering angles.
@@ -111,58 +109,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         attractor: cell.attractor,
         kind: basin.attractors[cell.attractor].kind.to_string(),
     });
-    arguments
-        .destinations
-        .write(rows, &results, || chart(&results).svg())?;
+    arguments.destinations.write(rows, &results, || {
+        chart(&basin, results.wheel_speed_rpm).svg()
+    })?;
     for (k, attractor) in basin.attractors.iter().enumerate() {
         let cells = basin.cells.iter().filter(|c| c.attractor == k).count();
         say!(
             "attractor {k}: {} ({})",
-            name(attractor),
+            attractor.describe(),
             counted(cells, "start")
         );
     }
     check_interrupted(basin.cells.len(), runs)?;
     Ok(Outcome::Success)
-}
-
-/// Kind and place.
-fn name(attractor: &Attractor) -> String {
-    let kind = attractor.kind;
-    match kind {
-        Kind::Diverges | Kind::NotFollowed(_) => kind.to_string(),
-        Kind::Equilibrium => {
-            let [beta, _, delta, _] = attractor.end;
-            format!("{kind} near beta {beta:.3}, delta_f {delta:.3} rad")
-        }
-        _ => {
-            let (low, high) = attractor.yaw_rates_rad_per_s();
-            let lobe = attractor.lobe();
-            format!("{kind}, yaw rate {low:.2} to {high:.2} rad/s, steering angle {lobe}")
-        }
-    }
-}
-
-fn chart(results: &Results) -> Chart {
-    let basin = results.basin;
-    let series = |(k, attractor): (usize, &Attractor)| {
-        let cells = basin.cells.iter().filter(|cell| cell.attractor == k);
-        let start = |cell: &Cell| (cell.sideslip_rad, cell.steering_angle_rad);
-        large_dots(&name(attractor), k, cells.map(start).collect())
-    };
-    Chart {
-        heading: format!("Basins of attraction at {} rpm", results.wheel_speed_rpm),
-        panels: vec![Panel {
-            caption: "where the motion ends, by its start".into(),
-            x: AxisSpec::linear("sideslip angle at the start (rad)"),
-            y: AxisSpec::linear("steering angle at the start (rad)"),
-            series: basin
-                .attractors
-                .iter()
-                .enumerate()
-                .flat_map(series)
-                .collect(),
-            ..Panel::default()
-        }],
-    }
 }

@@ -4,9 +4,8 @@ use super::options::RunOptions;
 use super::outcome::Outcome;
 use super::output::Destinations;
 use anyhow::ensure;
-use dynamics::convergence::{Error, errors};
+use dynamics::convergence::{chart, errors};
 use dynamics::words::Short;
-use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 
 /// Error of the ECU's fixed step against the reference integrator, over the length of the step.
 ///
@@ -50,22 +49,4 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         .destinations
         .write(&errors, &errors, || chart(&errors, time_s).svg())?;
     Ok(Outcome::Success)
-}
-
-fn chart(errors: &[Error], time_s: f64) -> Chart {
-    let points = errors.iter().map(|error| (error.step_s, error.error));
-    Chart {
-        heading: "Fixed step against the reference integrator".into(),
-        panels: vec![Panel {
-            caption: format!("greatest error of a component after {time_s} s"),
-            x: AxisSpec::logarithmic("step (s)"),
-            y: AxisSpec::logarithmic("error (rad, rad/s)"),
-            series: vec![Series {
-                label: "fixed step".into(),
-                points: points.collect(),
-                look: Look::Line(0),
-            }],
-            ..Panel::default()
-        }],
-    }
 }

@@ -3,12 +3,11 @@
 use super::options::RunOptions;
 use super::outcome::Outcome;
 use super::output::Destinations;
-use super::sweep::{SpeedRange, check_interrupted, large_dots, with_progress};
+use super::sweep::{SpeedRange, check_interrupted, with_progress};
 use anyhow::{bail, ensure};
 use dynamics::eigenvalues::Eigenvalue;
-use dynamics::equilibria::{Equilibrium, Hopf, hopf, over_speed};
+use dynamics::equilibria::{Equilibrium, Hopf, Speed, chart, hopf, over_speed};
 use dynamics::words::{counted, counted_as};
-use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::vehicle::STEERING_ANGLE;
 
@@ -39,12 +38,6 @@ const MOST_SPEEDS: usize = 100_000;
 struct Results {
     speeds: Vec<Speed>,
     hopf: Vec<Hopf>,
-}
-
-#[derive(Serialize)]
-struct Speed {
-    wheel_speed_rpm: f64,
-    equilibria: Vec<Equilibrium>,
 }
 
 /// A row of the CSV.
@@ -124,9 +117,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         let row = |equilibrium| Row::new(speed.wheel_speed_rpm, equilibrium);
         speed.equilibria.iter().map(row)
     });
-    arguments
-        .destinations
-        .write(rows, &results, || chart(&results).svg())?;
+    arguments.destinations.write(rows, &results, || {
+        chart(&results.speeds, &results.hopf).svg()
+    })?;
     show(&results);
     check_interrupted(results.speeds.len(), values.count())?;
     Ok(Outcome::Success)
@@ -185,114 +178,4 @@ fn show_speed(speed: &Speed) {
             );
         }
     }
-}
-
-fn chart(results: &Results) -> Chart {
-    match &results.speeds[..] {
-        [speed] => eigenvalue_chart(speed),
-        speeds => speed_chart(speeds, &results.hopf),
-    }
-}
-
-/// The eigenvalues at one speed in the complex plane.
-fn eigenvalue_chart(speed: &Speed) -> Chart {
-    let series = |label: &str, stable: bool| {
-        let chosen = speed.equilibria.iter().filter(move |e| e.stable == stable);
-        let all = chosen.flat_map(|e| &e.eigenvalues_per_s);
-        let points = all.map(|e| (e.re, e.im)).collect();
-        large_dots(label, usize::from(!stable), points)
-    };
-    let mut all = series("of stable equilibria", true);
-    all.extend(series("of unstable equilibria", false));
-    Chart {
-        heading: format!(
-            "Eigenvalues of the equilibria at {} rpm",
-            speed.wheel_speed_rpm
-        ),
-        panels: vec![Panel {
-            x: AxisSpec::linear("real part (1/s)"),
-            y: AxisSpec::linear("imaginary part (1/s)"),
-            series: all,
-            instants: vec![(0.0, String::new())],
-            ..Panel::default()
-        }],
-    }
-}
-
-fn speed_chart(speeds: &[Speed], hopf: &[Hopf]) -> Chart {
-    let all = || {
-        let of = |s: &'_ Speed| s.equilibria.iter().map(|e| e.slip_angles_rad).collect();
-        speeds.iter().flat_map(of as fn(&Speed) -> Vec<[f64; 2]>)
-    };
-    let mut branches: Vec<[f64; 2]> = Vec::new();
-    for slip in all() {
-        let near = |b: &[f64; 2]| (b[0] - slip[0]).hypot(b[1] - slip[1]) < 1e-3;
-        if !branches.iter().any(near) {
-            branches.push(slip);
-        }
-    }
-    let bifurcating: Vec<_> = hopf.iter().map(|h| h.slip_angles_rad).collect();
-    let panel = |caption: &str, y: &str, branches: &[[f64; 2]], of: Quantity| Panel {
-        caption: caption.into(),
-        x: AxisSpec::linear("wheel speed (rpm)"),
-        y: AxisSpec::linear(y),
-        series: branches
-            .iter()
-            .flat_map(|branch| {
-                [("stable", true), ("unstable", false)].map(|(label, stable)| Series {
-                    label: label.into(),
-                    points: branch_points(speeds, branch, stable, of),
-                    look: Look::Line(usize::from(!stable)),
-                })
-            })
-            .filter(|series| series.points.iter().any(|point| point.1.is_finite()))
-            .collect(),
-        instants: hopf
-            .iter()
-            .map(|h| {
-                let rpm = 0.5 * (h.lower_rpm + h.upper_rpm);
-                (rpm, format!("Hopf, {rpm:.1}"))
-            })
-            .collect(),
-        ..Panel::default()
-    };
-    let angle: Quantity = |e| Some(e.state[STEERING_ANGLE]);
-    let growth: Quantity = |e| Some(e.leading_pair()?.re);
-    let mut panels = vec![panel(
-        "steering angle at rest",
-        "steering angle (rad)",
-        &branches,
-        angle,
-    )];
-    if !hopf.is_empty() {
-        let caption = "growth of the pair of eigenvalues that changes stability";
-        let mut growths = panel(caption, "real part (1/s)", &bifurcating, growth);
-        growths.levels = vec![0.0];
-        panels.push(growths);
-    }
-    Chart {
-        heading: "Equilibria over wheel speed".into(),
-        panels,
-    }
-}
-
-/// What a chart shows of an equilibrium.
-type Quantity = fn(&Equilibrium) -> Option<f64>;
-
-/// A branch's stable or unstable part over the speed; NaN interrupts the line elsewhere.
-fn branch_points(
-    speeds: &[Speed],
-    branch: &[f64; 2],
-    stable: bool,
-    of: Quantity,
-) -> Vec<(f64, f64)> {
-    let value = |speed: &Speed| {
-        let mut on = speed.equilibria.iter().filter(|e| e.is_on_branch(branch));
-        on.find(|e| e.stable == stable).and_then(of)
-    };
-    let point = |speed| (speed, f64::NAN);
-    speeds
-        .iter()
-        .map(|s| value(s).map_or(point(s.wheel_speed_rpm), |y| (s.wheel_speed_rpm, y)))
-        .collect()
 }

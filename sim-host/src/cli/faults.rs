@@ -102,7 +102,6 @@ fn on_host(quick: bool) -> anyhow::Result<Vec<Row>> {
 mod processor {
     use super::{FLIPS, QUICK_FLIPS, progress};
     use image::Image;
-    use interrupt;
     use pil::fault::campaign::Row;
     use pil::fault::memory::flips;
     use pil::fault::processor::{Action, BENCH_TICKS, Bench};

@@ -7,12 +7,11 @@ use super::sweep::SpeedRange;
 use anyhow::ensure;
 use clap::ValueEnum;
 use dynamics::flow::{Flow, VehicleFlow};
-use dynamics::method::{Estimate, Method, estimates};
+use dynamics::method::{Estimate, Method, chart, estimates};
 use dynamics::sweep::{Parameter, RunControl, Timing, scenarios};
 use dynamics::synchronisation::Search;
 use dynamics::words::{Short, counted};
 use indicatif::{ProgressBar, ProgressStyle};
-use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
 use std::time::{Duration, Instant};
@@ -249,73 +248,4 @@ fn show(estimates: &[Estimate]) {
             reason.unwrap_or_default()
         );
     }
-}
-
-/// A panel for each method, for the spectrum one for each pair of exponents.
-fn chart(estimates: &[Estimate], methods: &[Method], timing: Timing) -> Chart {
-    let panel = |caption: &str, method: Method, first: usize, labels: &[&str]| Panel {
-        caption: caption.into(),
-        x: AxisSpec::linear("wheel speed (rpm)"),
-        y: AxisSpec::linear("exponent (1/s)"),
-        series: labels
-            .iter()
-            .enumerate()
-            .flat_map(|(line, label)| {
-                let chosen = move |e: &&Estimate| e.method == method && e.index == first + line;
-                series(label, estimates.iter().filter(chosen), line)
-            })
-            .collect(),
-        levels: if first == 1 { vec![0.0] } else { vec![] },
-        ..Panel::default()
-    };
-    const PAIR: [&str; 2] = ["first or third exponent", "second or fourth"];
-    let panels = methods.iter().flat_map(|&method| match method {
-        Method::Spectrum => vec![
-            panel("spectrum: first and second", method, 1, &PAIR),
-            panel(
-                "spectrum: third and fourth (none where stick takes a dimension away)",
-                method,
-                3,
-                &PAIR,
-            ),
-        ],
-        _ => vec![panel(method.name(), method, 1, &[""])],
-    });
-    Chart {
-        heading: format!(
-            "Lyapunov exponents over {} s, with one standard error",
-            timing.observed_s
-        ),
-        panels: panels.collect(),
-    }
-}
-
-/// The exponents as a line, and their standard errors as bars.
-fn series<'a>(
-    label: &str,
-    estimates: impl Iterator<Item = &'a Estimate> + Clone,
-    line: usize,
-) -> [Series; 2] {
-    const GAP: (f64, f64) = (f64::NAN, f64::NAN);
-    let point = |e: &Estimate| {
-        e.exponent_per_s
-            .map_or(GAP, |exponent| (e.wheel_speed_rpm, exponent))
-    };
-    let bar = |e: &Estimate| {
-        let (rpm, exponent) = point(e);
-        let error = e.error_per_s().unwrap_or(f64::NAN);
-        [(rpm, exponent - error), (rpm, exponent + error), GAP]
-    };
-    [
-        Series {
-            label: label.into(),
-            points: estimates.clone().map(point).collect(),
-            look: Look::Line(line),
-        },
-        Series {
-            label: String::new(),
-            points: estimates.flat_map(bar).collect(),
-            look: Look::Line(line),
-        },
-    ]
 }

@@ -4,14 +4,14 @@ use super::options::RunOptions;
 use super::outcome::Outcome;
 use super::output::Destinations;
 use super::sweep::{
-    RangeOptions, TransientOptions, check_interrupted, paper_regions, side_by_side, with_progress,
+    RangeOptions, TransientOptions, check_interrupted, side_by_side, with_paper_regions,
+    with_progress,
 };
 use clap::ValueEnum;
 use dynamics::component::Component;
-use dynamics::orbit::{self, Point, Section, Start, diagram};
+use dynamics::orbit::{self, Point, Section, Start, chart, diagram};
 use dynamics::sweep::{Parameter, Timing};
 use dynamics::words::counted;
-use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
 
@@ -150,9 +150,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let rows = points
         .iter()
         .flat_map(|point| rows(&scenario, parameter, section, point));
-    arguments
-        .destinations
-        .write(rows, &results, || chart(&results).svg())?;
+    arguments.destinations.write(rows, &results, || {
+        let chart = chart(&points, parameter, section, start);
+        with_paper_regions(chart, parameter).svg()
+    })?;
     say!("{}", summary(&results));
     check_interrupted(points.len(), values.count())?;
     Ok(Outcome::Success)
@@ -202,60 +203,4 @@ fn summary(results: &Results) -> String {
         results.parameter.name(),
         not_followed.unwrap_or_default()
     )
-}
-
-fn chart(results: &Results) -> Chart {
-    let points = |point: &Point| -> Vec<(f64, f64)> {
-        let at = |&value: &f64| (point.value, value);
-        match &point.orbit {
-            orbit::Outcome::Meets { values } => values.iter().map(at).collect(),
-            orbit::Outcome::Rests { value } => vec![(point.value, *value)],
-            orbit::Outcome::Misses
-            | orbit::Outcome::Diverges { .. }
-            | orbit::Outcome::NotFollowed(_) => Vec::new(),
-        }
-    };
-    let (name, shown) = (results.parameter.name(), results.shown.label());
-    let first = results.points.first().map_or(0.0, |p| p.value);
-    let last = results.points.last().map_or(0.0, |p| p.value);
-    let caption = match results.section {
-        Section::YawRateMaxima => "local maxima of the yaw rate".into(),
-        Section::Rising { component, level } => {
-            format!(
-                "{shown} where the {} rises through {level}",
-                component.label()
-            )
-        }
-    };
-    let from = match results.start {
-        Start::Fixed => "each from the same start",
-        Start::Up => "continued upwards",
-        Start::Down => "continued downwards",
-    };
-    let regions = paper_regions(results.parameter, first, last);
-    let paper = if regions.is_empty() {
-        ""
-    } else {
-        "; I to IV: the paper's regions"
-    };
-    let axis = AxisSpec::linear(name);
-    Chart {
-        heading: format!("Orbit diagram over {name}"),
-        panels: vec![Panel {
-            caption: format!("{caption}, {from}{paper}"),
-            x: if first < last {
-                axis.from_to(first, last)
-            } else {
-                axis
-            },
-            y: AxisSpec::linear(shown),
-            series: vec![Series {
-                label: String::new(),
-                points: results.points.iter().flat_map(points).collect(),
-                look: Look::Dots,
-            }],
-            regions,
-            ..Panel::default()
-        }],
-    }
 }

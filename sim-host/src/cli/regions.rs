@@ -4,13 +4,13 @@ use super::options::RunOptions;
 use super::outcome::Outcome;
 use super::output::Destinations;
 use super::sweep::{
-    RangeOptions, TransientOptions, check_interrupted, paper_regions, side_by_side, with_progress,
+    RangeOptions, TransientOptions, check_interrupted, side_by_side, with_paper_regions,
+    with_progress,
 };
 use anyhow::ensure;
-use dynamics::regions::{Regions, Sample, coexisting, regions};
+use dynamics::regions::{Regions, Sample, chart, coexisting, regions};
 use dynamics::sweep::{Parameter, Timing, mirrored};
 use dynamics::words::{Short, counted};
-use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
 
@@ -117,9 +117,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         let row = |sample| row(&scenario, parameter, sweep.start, sample);
         sweep.found.samples.iter().map(row)
     });
-    arguments
-        .destinations
-        .write(rows, &results, || chart(&results).svg())?;
+    arguments.destinations.write(rows, &results, || {
+        let sweeps = results.sweeps.iter();
+        let sweeps: Vec<_> = sweeps.map(|sweep| (sweep.start, &sweep.found)).collect();
+        with_paper_regions(chart(&sweeps, parameter), parameter).svg()
+    })?;
     show(&results);
     let done = results.sweeps.iter().map(|s| s.found.samples.len()).sum();
     check_interrupted(done, runs.max(done))?;
@@ -186,69 +188,5 @@ fn show(results: &Results) {
             counted(at.len(), "value")
         ),
         _ => say!("both starts end on the same attractor at every value"),
-    }
-}
-
-fn chart(results: &Results) -> Chart {
-    let name = results.parameter.name();
-    let samples = || results.sweeps.iter().flat_map(|s| &s.found.samples);
-    let values = || samples().map(|sample| sample.value);
-    let first = values().fold(f64::INFINITY, f64::min);
-    let last = values().fold(f64::NEG_INFINITY, f64::max);
-    let paper = paper_regions(results.parameter, first, last);
-    let series = |of: fn(&Sample) -> Vec<f64>, look: fn(usize) -> Look| -> Vec<Series> {
-        let one = |(n, sweep): (usize, &Sweep)| Series {
-            label: format!("from the {} start", sweep.start),
-            points: sweep
-                .found
-                .samples
-                .iter()
-                .flat_map(|s| of(s).into_iter().map(|y| (s.value, y)))
-                .collect(),
-            look: look(n),
-        };
-        results.sweeps.iter().enumerate().map(one).collect()
-    };
-    let axis = || {
-        let axis = AxisSpec::linear(name);
-        if first < last {
-            axis.from_to(first, last)
-        } else {
-            axis
-        }
-    };
-    let maxima = |sample: &Sample| match sample.attractor.kind.stays() {
-        false => Vec::new(),
-        true if sample.attractor.maxima_rad_per_s.is_empty() => {
-            vec![sample.attractor.yaw_rates_rad_per_s().1]
-        }
-        true => sample.attractor.maxima_rad_per_s.clone(),
-    };
-    let exponent = |sample: &Sample| sample.attractor.exponent_per_s.into_iter().collect();
-    let caption = |text: &str| match paper.is_empty() {
-        true => text.to_string(),
-        false => format!("{text}; I to IV: the paper's regions"),
-    };
-    Chart {
-        heading: format!("Kinds of motion over {name}"),
-        panels: vec![
-            Panel {
-                caption: caption("local maxima of the yaw rate"),
-                x: axis(),
-                y: AxisSpec::linear("yaw rate (rad/s)"),
-                series: series(maxima, |_| Look::Dots),
-                regions: paper.clone(),
-                ..Panel::default()
-            },
-            Panel {
-                caption: caption("largest Lyapunov exponent"),
-                x: axis(),
-                y: AxisSpec::linear("exponent (1/s)"),
-                series: series(exponent, Look::Line),
-                regions: paper.clone(),
-                levels: vec![0.0],
-                ..Panel::default()
-            },
-        ],
     }
 }

@@ -5,9 +5,8 @@ use super::output::Destinations;
 use super::settled::{SettledRun, title};
 use anyhow::{Context, ensure};
 use dynamics::component::Component;
-use dynamics::power_spectrum::{MIN_SEGMENT, PowerSpectrum, welch};
+use dynamics::power_spectrum::{MIN_SEGMENT, PowerSpectrum, chart, welch};
 use dynamics::words::{Short, counted};
-use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
@@ -15,8 +14,6 @@ use std::f64::consts::TAU;
 
 /// Segments of half overlap that a run has by default.
 const SEGMENTS: f64 = 8.0;
-/// Intervals of the frequency axis in the figure.
-const INTERVALS: f64 = 700.0;
 
 /// Power spectrum of the settled motion by Welch's method (Hann window, half overlap, one-sided density).
 ///
@@ -107,9 +104,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let signal: Vec<f64> = trace.component(component.index).collect();
     let spectrum = welch(&signal, scenario.model_rate_hz(), segment)?;
     let results = results(arguments, &scenario, &spectrum).context("nothing was written")?;
-    arguments
-        .destinations
-        .write(&results.bins, &results, || chart(&scenario, &results).svg())?;
+    arguments.destinations.write(&results.bins, &results, || {
+        let component = results.component;
+        let dither = results.dither.as_ref();
+        let dither = dither.map(|line| (line.frequency_hz, dither_label(line)));
+        let heading = format!(
+            "Power spectrum of {} \u{2013} {}",
+            component.title,
+            title(&scenario)
+        );
+        chart(&spectrum, heading, component.unit, dither).svg()
+    })?;
     say!(
         "{}, bins of {:.4} Hz; power {:.6e} ({})\u{b2}, greatest at {:.4} Hz",
         counted(results.segments, "segment"),
@@ -176,56 +181,9 @@ fn results(
     })
 }
 
-fn chart(scenario: &Scenario<f64>, results: &Results) -> Chart {
-    // Without its mean the signal has nothing at zero frequency, and a logarithmic axis no place for it.
-    let bins = &results.bins[1..];
-    let ends = (bins[0].frequency_hz, bins[bins.len() - 1].frequency_hz);
-    let instant = |line: &DitherLine| {
-        let label = format!(
-            "dither, {} rad/s = {:.1} Hz",
-            line.frequency_rad_per_s, line.frequency_hz
-        );
-        (line.frequency_hz, label)
-    };
-    let unit = results.component.unit;
-    let panel = Panel {
-        caption: format!(
-            "{}, Hann window, half overlap; bins of {:.3} Hz, the greatest in each drawn interval",
-            counted(results.segments, "segment"),
-            results.bin_hz
-        ),
-        x: AxisSpec::logarithmic("frequency (Hz)").from_to(ends.0, ends.1),
-        y: AxisSpec::logarithmic(format!("density (({unit})\u{b2}/Hz)")),
-        series: vec![Series {
-            label: String::new(),
-            points: envelope(bins, ends),
-            look: Look::Line(0),
-        }],
-        instants: results.dither.iter().map(instant).collect(),
-        ..Panel::default()
-    };
-    Chart {
-        heading: format!(
-            "Power spectrum of {} \u{2013} {}",
-            results.component.title,
-            title(scenario)
-        ),
-        panels: vec![panel],
-    }
-}
-
-/// The bin with the greatest density in each of many intervals of equal length on a logarithmic axis.
-fn envelope(bins: &[Row], (low, high): (f64, f64)) -> Vec<(f64, f64)> {
-    let interval = |row: &Row| {
-        let share = (row.frequency_hz / low).ln() / (high / low).ln();
-        (share * INTERVALS) as i64
-    };
-    bins.chunk_by(|a, b| interval(a) == interval(b))
-        .filter_map(|chunk| {
-            chunk
-                .iter()
-                .max_by(|a, b| a.density_per_hz.total_cmp(&b.density_per_hz))
-        })
-        .map(|row| (row.frequency_hz, row.density_per_hz))
-        .collect()
+fn dither_label(line: &DitherLine) -> String {
+    format!(
+        "dither, {} rad/s = {:.1} Hz",
+        line.frequency_rad_per_s, line.frequency_hz
+    )
 }

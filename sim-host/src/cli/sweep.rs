@@ -8,7 +8,7 @@ use dynamics::sweep::{LARGEST_BATCH, Parameter, RunControl, SweepError, Timing, 
 use dynamics::words::counted;
 use engine::taylor::Observables;
 use indicatif::{HumanDuration, ProgressBar, ProgressStyle};
-use plot::chart::{Look, Region, Series};
+use plot::chart::{Chart, Region};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use sim_host::paper::REGION_EDGES_RPM;
@@ -202,11 +202,23 @@ pub fn check_interrupted(done: usize, of: usize) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The paper's regions I to IV where they meet a sweep over the speed, to be shaded.
-pub fn paper_regions(parameter: Parameter, from: f64, to: f64) -> Vec<Region> {
+/// The chart with the paper's regions I to IV shaded, if its panels are over the wheel speed.
+pub fn with_paper_regions(mut chart: Chart, parameter: Parameter) -> Chart {
     if parameter != Parameter::Speed {
-        return Vec::new();
+        return chart;
     }
+    for panel in &mut chart.panels {
+        let Some((from, to)) = panel.x.range else {
+            continue;
+        };
+        panel.regions = paper_regions(from, to);
+        panel.caption += "; I to IV: the paper's regions";
+    }
+    chart
+}
+
+/// The paper's regions I to IV where they meet a sweep over the speed, to be shaded.
+fn paper_regions(from: f64, to: f64) -> Vec<Region> {
     let [first, second, third] = REGION_EDGES_RPM;
     let edges = [f64::NEG_INFINITY, first, second, third, f64::INFINITY];
     let region = |(ends, label): (&[f64], &str)| Region {
@@ -216,29 +228,4 @@ pub fn paper_regions(parameter: Parameter, from: f64, to: f64) -> Vec<Region> {
     };
     let all = edges.windows(2).zip(["I", "II", "III", "IV"]).map(region);
     all.filter(|region| region.to > region.from).collect()
-}
-
-/// More dots than this are drawn small: so many large ones would hide each other.
-const MOST_LARGE_DOTS: usize = 3000;
-/// Colours of dots before they repeat.
-const COLOURS: usize = 4;
-
-/// The `n`-th set of dots of a panel, to be seen one by one: a name for the legend, and each dot as a line of one point.
-pub fn large_dots(label: &str, n: usize, points: Vec<(f64, f64)>) -> Vec<Series> {
-    let named = Series {
-        label: label.into(),
-        points: points.clone(),
-        look: Look::Dots,
-    };
-    if points.len() > MOST_LARGE_DOTS {
-        return vec![named];
-    }
-    let large = |point| Series {
-        label: String::new(),
-        points: vec![point],
-        look: Look::Line(n % COLOURS),
-    };
-    std::iter::once(named)
-        .chain(points.into_iter().map(large))
-        .collect()
 }

@@ -169,8 +169,8 @@ impl Attractor {
 
     /// The two are the same attractor: of the same kind, and at rest within 1e-4 of each other or in the stick band of the
     /// same of the `equilibria`; in motion with extents in every component that have 97 % in common, 80 % without a period.
-    /// Ensemble that diverge are the same, and those that could not be followed for the same reason.
-    pub fn is_same(&self, other: &Self, equilibria: &[Equilibrium]) -> bool {
+    /// Trajectories that diverge are the same, and those that could not be followed for the same reason.
+    pub(crate) fn is_same(&self, other: &Self, equilibria: &[Equilibrium]) -> bool {
         if self.kind != other.kind {
             return false;
         }
@@ -269,4 +269,23 @@ fn bands(maxima: &[(f64, f64)]) -> usize {
     };
     let most = MAX_BANDS.min(maxima.len() / MAXIMA_PER_BAND);
     (2..=most).rev().find(|&n| apart(n)).unwrap_or(1)
+}
+
+impl Attractor {
+    /// Kind and place, for people.
+    pub fn describe(&self) -> String {
+        let kind = self.kind;
+        match kind {
+            Kind::Diverges | Kind::NotFollowed(_) => kind.to_string(),
+            Kind::Equilibrium => {
+                let [beta, _, delta, _] = self.end;
+                format!("{kind} near beta {beta:.3}, delta_f {delta:.3} rad")
+            }
+            _ => {
+                let (low, high) = self.yaw_rates_rad_per_s();
+                let lobe = self.lobe();
+                format!("{kind}, yaw rate {low:.2} to {high:.2} rad/s, steering angle {lobe}")
+            }
+        }
+    }
 }

@@ -4,6 +4,7 @@ use crate::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
 use crate::simulate::{settle, simulate, started_at};
 use crate::sweep::SweepError;
 use crate::trace::Trace;
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use rayon::prelude::*;
 use serde::Serialize;
 use shared_model::dither::{Application, Waveform};
@@ -96,4 +97,28 @@ fn compare_at(
         },
         swing_difference_percent: alike.then(|| percent(swing(&signal), swing(&averaged))),
     })
+}
+
+/// Differences over the frequency.
+pub fn chart(comparisons: &[Comparison]) -> Chart {
+    let series = |label: &str, line, value: fn(&Comparison) -> Option<f64>| Series {
+        label: label.into(),
+        points: comparisons
+            .iter()
+            .filter_map(|c| Some((c.frequency_rad_per_s, value(c)?.abs())))
+            .collect(),
+        look: Look::Line(line),
+    };
+    Chart {
+        heading: "Averaging: the true dither signal against the averaged system".into(),
+        panels: vec![Panel {
+            x: AxisSpec::logarithmic("dither frequency (rad/s)"),
+            y: AxisSpec::logarithmic("difference (%)"),
+            series: vec![
+                series("cycle time", 0, |c| c.cycle_difference_percent),
+                series("swing of the yaw rate", 1, |c| c.swing_difference_percent),
+            ],
+            ..Panel::default()
+        }],
+    }
 }

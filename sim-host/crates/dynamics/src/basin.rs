@@ -3,6 +3,7 @@
 use crate::attractor::{Attractor, Kind, attractors};
 use crate::equilibria;
 use crate::sweep::{RunControl, SweepError, Timing, Values};
+use plot::chart::{AxisSpec, Chart, Panel, large_dots};
 use shared_model::Scenario;
 
 /// One start, and where it ends.
@@ -27,7 +28,7 @@ pub struct Basin {
 
 /// Follows the motion from each start of the grid; yaw rate and steering rate start as in the scenario.
 ///
-/// Ensemble are told apart by kind and extent ([`Attractor::is_same`]); the first on each attractor without period has its
+/// Trajectories are told apart by kind and extent ([`Attractor::is_same`]); the first on each attractor without period has its
 /// exponent worked out, which tells chaos from a transient that outlasts the run. Time grows with the number of starts
 /// times the length of a run; starts that diverge end early.
 ///
@@ -79,4 +80,28 @@ pub fn basin(
     };
     let attractors = found.into_iter().map(name).collect();
     Ok(Basin { attractors, cells })
+}
+
+/// Initial states by the attractor that they approach.
+pub fn chart(basin: &Basin, wheel_speed_rpm: f64) -> Chart {
+    let series = |(k, attractor): (usize, &Attractor)| {
+        let cells = basin.cells.iter().filter(|cell| cell.attractor == k);
+        let start = |cell: &Cell| (cell.sideslip_rad, cell.steering_angle_rad);
+        large_dots(&attractor.describe(), k, cells.map(start).collect())
+    };
+    Chart {
+        heading: format!("Basins of attraction at {wheel_speed_rpm} rpm"),
+        panels: vec![Panel {
+            caption: "where the motion ends, by its start".into(),
+            x: AxisSpec::linear("sideslip angle at the start (rad)"),
+            y: AxisSpec::linear("steering angle at the start (rad)"),
+            series: basin
+                .attractors
+                .iter()
+                .enumerate()
+                .flat_map(series)
+                .collect(),
+            ..Panel::default()
+        }],
+    }
 }

@@ -114,7 +114,7 @@ pub fn to_toml(scenario: &Scenario<f64>) -> String {
 ///
 /// ```
 /// use shared_model::Scenario;
-/// let text = crate::config::to_commented_toml(&Scenario::reconstruction());
+/// let text = dynamics::config::to_commented_toml(&Scenario::reconstruction());
 /// assert!(text.contains("mass_kg = 1500.0 # 1 to 100000\n"));
 /// ```
 pub fn to_commented_toml(scenario: &Scenario<f64>) -> String {

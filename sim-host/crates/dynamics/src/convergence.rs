@@ -3,6 +3,7 @@
 use crate::sweep::SweepError;
 use engine::Stepper;
 use engine::reference::Reference;
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use serde::Serialize;
 use shared_model::Scenario;
 
@@ -44,4 +45,23 @@ pub fn errors(scenario: &Scenario<f64>, time_s: f64) -> Result<Vec<Error>, Sweep
         });
     }
     Ok(errors)
+}
+
+/// Errors after `time_s` over the length of the step.
+pub fn chart(errors: &[Error], time_s: f64) -> Chart {
+    let points = errors.iter().map(|error| (error.step_s, error.error));
+    Chart {
+        heading: "Fixed step against the reference integrator".into(),
+        panels: vec![Panel {
+            caption: format!("greatest error of a component after {time_s} s"),
+            x: AxisSpec::logarithmic("step (s)"),
+            y: AxisSpec::logarithmic("error (rad, rad/s)"),
+            series: vec![Series {
+                label: "fixed step".into(),
+                points: points.collect(),
+                look: Look::Line(0),
+            }],
+            ..Panel::default()
+        }],
+    }
 }

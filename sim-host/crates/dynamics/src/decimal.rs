@@ -30,7 +30,7 @@ impl Spaced {
     ///
     /// # Errors
     /// See [`NotSpaced`].
-    pub fn in_steps(from: f64, to: f64, step: f64, most: usize) -> Result<Self, NotSpaced> {
+    pub(crate) fn in_steps(from: f64, to: f64, step: f64, most: usize) -> Result<Self, NotSpaced> {
         if ((to - from) / step).abs() > most as f64 {
             return Err(NotSpaced::Count);
         }

@@ -10,6 +10,7 @@ use crate::eigenvalues::{Eigenvalue, eigenvalues};
 use crate::sweep::{Parameter, RunControl, SweepError, Values, scenarios};
 use engine::dual::Dual;
 use nalgebra::{Matrix2, Matrix3, Matrix4, Vector3, Vector4};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series, large_dots};
 use shared_model::dither::{Application, Injection};
 use shared_model::friction::{FrictionLaw, FrictionMode, Sign};
 use shared_model::vehicle::{Model, SIDESLIP, STEERING_ANGLE, STEERING_RATE, YAW_RATE};
@@ -78,7 +79,7 @@ impl Equilibrium {
     }
 
     /// The equilibrium with these slip angles (rad) is this one at another speed: the motor's torque fixes the forces, so the slip angles stay.
-    pub fn is_on_branch(&self, slip_angles_rad: &[f64; 2]) -> bool {
+    pub(crate) fn is_on_branch(&self, slip_angles_rad: &[f64; 2]) -> bool {
         let mut pairs = self.slip_angles_rad.iter().zip(slip_angles_rad);
         pairs.all(|(a, b)| (a - b).abs() < SAME_BRANCH_RAD)
     }
@@ -379,4 +380,124 @@ fn followed(
         Some(balance.equilibrium(x, residual, mode))
     });
     Ok(arrived)
+}
+
+/// The equilibria at one wheel speed.
+#[derive(Debug, Clone, serde::Serialize)]
+pub struct Speed {
+    /// The speed, rpm.
+    pub wheel_speed_rpm: f64,
+    /// Its equilibria.
+    pub equilibria: Vec<Equilibrium>,
+}
+
+/// Eigenvalues in the complex plane at one speed, or branches over several, with their Hopf bifurcations.
+pub fn chart(speeds: &[Speed], hopf: &[Hopf]) -> Chart {
+    match speeds {
+        [speed] => eigenvalue_chart(speed),
+        speeds => speed_chart(speeds, hopf),
+    }
+}
+
+/// The eigenvalues at one speed in the complex plane.
+fn eigenvalue_chart(speed: &Speed) -> Chart {
+    let series = |label: &str, stable: bool| {
+        let chosen = speed.equilibria.iter().filter(move |e| e.stable == stable);
+        let all = chosen.flat_map(|e| &e.eigenvalues_per_s);
+        let points = all.map(|e| (e.re, e.im)).collect();
+        large_dots(label, usize::from(!stable), points)
+    };
+    let mut all = series("of stable equilibria", true);
+    all.extend(series("of unstable equilibria", false));
+    Chart {
+        heading: format!(
+            "Eigenvalues of the equilibria at {} rpm",
+            speed.wheel_speed_rpm
+        ),
+        panels: vec![Panel {
+            x: AxisSpec::linear("real part (1/s)"),
+            y: AxisSpec::linear("imaginary part (1/s)"),
+            series: all,
+            instants: vec![(0.0, String::new())],
+            ..Panel::default()
+        }],
+    }
+}
+
+fn speed_chart(speeds: &[Speed], hopf: &[Hopf]) -> Chart {
+    let all = || {
+        let of = |s: &'_ Speed| s.equilibria.iter().map(|e| e.slip_angles_rad).collect();
+        speeds.iter().flat_map(of as fn(&Speed) -> Vec<[f64; 2]>)
+    };
+    let mut branches: Vec<[f64; 2]> = Vec::new();
+    for slip in all() {
+        let near = |b: &[f64; 2]| (b[0] - slip[0]).hypot(b[1] - slip[1]) < 1e-3;
+        if !branches.iter().any(near) {
+            branches.push(slip);
+        }
+    }
+    let bifurcating: Vec<_> = hopf.iter().map(|h| h.slip_angles_rad).collect();
+    let panel = |caption: &str, y: &str, branches: &[[f64; 2]], of: Quantity| Panel {
+        caption: caption.into(),
+        x: AxisSpec::linear("wheel speed (rpm)"),
+        y: AxisSpec::linear(y),
+        series: branches
+            .iter()
+            .flat_map(|branch| {
+                [("stable", true), ("unstable", false)].map(|(label, stable)| Series {
+                    label: label.into(),
+                    points: branch_points(speeds, branch, stable, of),
+                    look: Look::Line(usize::from(!stable)),
+                })
+            })
+            .filter(|series| series.points.iter().any(|point| point.1.is_finite()))
+            .collect(),
+        instants: hopf
+            .iter()
+            .map(|h| {
+                let rpm = 0.5 * (h.lower_rpm + h.upper_rpm);
+                (rpm, format!("Hopf, {rpm:.1}"))
+            })
+            .collect(),
+        ..Panel::default()
+    };
+    let angle: Quantity = |e| Some(e.state[STEERING_ANGLE]);
+    let growth: Quantity = |e| Some(e.leading_pair()?.re);
+    let mut panels = vec![panel(
+        "steering angle at rest",
+        "steering angle (rad)",
+        &branches,
+        angle,
+    )];
+    if !hopf.is_empty() {
+        let caption = "growth of the pair of eigenvalues that changes stability";
+        let mut growths = panel(caption, "real part (1/s)", &bifurcating, growth);
+        growths.levels = vec![0.0];
+        panels.push(growths);
+    }
+    Chart {
+        heading: "Equilibria over wheel speed".into(),
+        panels,
+    }
+}
+
+/// What a chart shows of an equilibrium.
+type Quantity = fn(&Equilibrium) -> Option<f64>;
+
+/// A branch's stable or unstable part over the speed; NaN interrupts the line elsewhere.
+fn branch_points(
+    speeds: &[Speed],
+    branch: &[f64; 2],
+    stable: bool,
+    of: Quantity,
+) -> Vec<(f64, f64)> {
+    let value = |speed: &Speed| {
+        let mut on = speed.equilibria.iter().filter(|e| e.is_on_branch(branch));
+        on.find(|e| e.stable == stable).and_then(of)
+    };
+    let point = |speed| (speed, f64::NAN);
+    speeds
+        .iter()
+        .map(|s| value(s).map_or(point(s.wheel_speed_rpm), |y| (s.wheel_speed_rpm, y)))
+        .collect()
 }

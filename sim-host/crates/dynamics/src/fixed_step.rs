@@ -1,4 +1,4 @@
-//! Ensemble that the engine cannot follow, because their friction is under the mean of a sine or they slide along a step of friction:
+//! Trajectories that the engine cannot follow, because their friction is under the mean of a sine or they slide along a step of friction:
 //! the same findings at the ECU's fixed step.
 
 use crate::component::Component;

@@ -129,7 +129,7 @@ impl VehicleFlow {
     }
 
     /// b_w/J_w, the rate at which the steering's viscous damping brakes it, 1/s.
-    pub fn steering_damping_per_s(&self) -> f64 {
+    pub(crate) fn steering_damping_per_s(&self) -> f64 {
         self.steering_damping_per_s
     }
 }

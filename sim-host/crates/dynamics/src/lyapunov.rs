@@ -4,7 +4,7 @@
 //! the right jumps at friction events; stick takes one dimension away), and the mean rate of its growth is the largest
 //! exponent. [`largest`] takes any recorded motion: the firmware's own telemetry will do. [`exponents`] runs freely along a
 //! [`Flow`] with as many vectors as exponents are wanted, kept at right angles. The engine's motions have tangent vectors of
-//! their own; their log_stretching become exponents here too.
+//! their own; their stretching becomes exponents here too.
 
 use crate::flow::{Flow, Unmeasured, check, steps};
 use crate::period::yaw_rate_maxima;

@@ -7,6 +7,7 @@ use crate::simulate::started_at;
 use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
 use engine::taylor::{Observables, Trajectory};
 use engine::{EarlyEnd, Reason};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::vehicle::{State, YAW_RATE};
 use shared_model::{InvalidScenario, Scenario};
 
@@ -231,5 +232,53 @@ fn point(value: f64, section: Section, found: &Trajectory<0>) -> Point {
         value,
         orbit,
         extent: (found.lower[component], found.upper[component]),
+    }
+}
+
+/// The orbit diagram.
+pub fn chart(points: &[Point], parameter: Parameter, section: Section, start: Start) -> Chart {
+    let values = |point: &Point| -> Vec<(f64, f64)> {
+        let at = |&value: &f64| (point.value, value);
+        match &point.orbit {
+            Outcome::Meets { values } => values.iter().map(at).collect(),
+            Outcome::Rests { value } => vec![(point.value, *value)],
+            Outcome::Misses | Outcome::Diverges { .. } | Outcome::NotFollowed(_) => Vec::new(),
+        }
+    };
+    let (name, shown) = (parameter.name(), section.shown().label());
+    let first = points.first().map_or(0.0, |p| p.value);
+    let last = points.last().map_or(0.0, |p| p.value);
+    let caption = match section {
+        Section::YawRateMaxima => "local maxima of the yaw rate".into(),
+        Section::Rising { component, level } => {
+            format!(
+                "{shown} where the {} rises through {level}",
+                component.label()
+            )
+        }
+    };
+    let from = match start {
+        Start::Fixed => "each from the same start",
+        Start::Up => "continued upwards",
+        Start::Down => "continued downwards",
+    };
+    let axis = AxisSpec::linear(name);
+    Chart {
+        heading: format!("Orbit diagram over {name}"),
+        panels: vec![Panel {
+            caption: format!("{caption}, {from}"),
+            x: if first < last {
+                axis.from_to(first, last)
+            } else {
+                axis
+            },
+            y: AxisSpec::linear(shown),
+            series: vec![Series {
+                label: String::new(),
+                points: points.iter().flat_map(values).collect(),
+                look: Look::Dots,
+            }],
+            ..Panel::default()
+        }],
     }
 }

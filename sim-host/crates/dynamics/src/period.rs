@@ -116,7 +116,7 @@ pub(crate) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
 }
 
 /// Time (s) and height of the maxima among a quantity's turning points that stand out by a hundredth of its range.
-pub fn maxima_of_turns(turns: &[(f64, f64)], range: f64) -> Vec<(f64, f64)> {
+pub(crate) fn maxima_of_turns(turns: &[(f64, f64)], range: f64) -> Vec<(f64, f64)> {
     let heights: Vec<f64> = turns.iter().map(|&(_, height)| height).collect();
     let maxima = prominent_maxima(&heights, PROMINENCE * range);
     maxima.into_iter().map(|k| turns[k]).collect()

@@ -4,6 +4,8 @@
 //! and Fourier transformed, and the squared magnitudes are averaged. The density is one-sided, in the signal's unit squared
 //! per Hz: its integral from 0 to half the sample rate is the signal's variance.
 
+use crate::words::counted;
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use realfft::RealFftPlanner;
 use std::f64::consts::TAU;
 
@@ -170,6 +172,55 @@ impl PowerSpectrum {
             prominence: lobe.iter().copied().fold(0.0, f64::max) / floor,
         })
     }
+}
+
+/// Intervals of the frequency axis in a chart.
+const INTERVALS: f64 = 700.0;
+
+/// The density of a signal in `unit` over the frequency, with an instant at a frequency (Hz) if one is given.
+pub fn chart(
+    spectrum: &PowerSpectrum,
+    heading: String,
+    unit: &str,
+    instant: Option<(f64, String)>,
+) -> Chart {
+    let bins = spectrum.density.iter().enumerate();
+    let bins = bins.map(|(k, density)| (spectrum.frequency_hz(k), *density));
+    // Without its mean the signal has nothing at zero frequency, and a logarithmic axis no place for it.
+    let bins: Vec<(f64, f64)> = bins.skip(1).collect();
+    let ends = (bins[0].0, bins[bins.len() - 1].0);
+    let panel = Panel {
+        caption: format!(
+            "{}, Hann window, half overlap; bins of {:.3} Hz, the greatest in each drawn interval",
+            counted(spectrum.segments, "segment"),
+            spectrum.bin_hz
+        ),
+        x: AxisSpec::logarithmic("frequency (Hz)").from_to(ends.0, ends.1),
+        y: AxisSpec::logarithmic(format!("density (({unit})\u{b2}/Hz)")),
+        series: vec![Series {
+            label: String::new(),
+            points: envelope(&bins, ends),
+            look: Look::Line(0),
+        }],
+        instants: instant.into_iter().collect(),
+        ..Panel::default()
+    };
+    Chart {
+        heading,
+        panels: vec![panel],
+    }
+}
+
+/// The bin with the greatest density in each of many intervals of equal length on a logarithmic axis.
+fn envelope(bins: &[(f64, f64)], (low, high): (f64, f64)) -> Vec<(f64, f64)> {
+    let interval = |bin: &(f64, f64)| {
+        let share = (bin.0 / low).ln() / (high / low).ln();
+        (share * INTERVALS) as i64
+    };
+    bins.chunk_by(|a, b| interval(a) == interval(b))
+        .filter_map(|chunk| chunk.iter().max_by(|a, b| a.1.total_cmp(&b.1)))
+        .copied()
+        .collect()
 }
 
 #[cfg(test)]

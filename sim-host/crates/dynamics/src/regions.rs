@@ -3,6 +3,7 @@
 use crate::attractor::{Attractor, Kind, attractors};
 use crate::equilibria;
 use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::Scenario;
 
 /// The motion at one value of the parameter.
@@ -172,4 +173,61 @@ pub fn coexisting(
         }
     }
     Ok(values)
+}
+
+/// Maxima of the yaw rate and largest exponents over the parameter, of sweeps from several starts by name.
+pub fn chart(sweeps: &[(&str, &Regions)], parameter: Parameter) -> Chart {
+    let name = parameter.name();
+    let samples = || sweeps.iter().flat_map(|(_, found)| &found.samples);
+    let values = || samples().map(|sample| sample.value);
+    let first = values().fold(f64::INFINITY, f64::min);
+    let last = values().fold(f64::NEG_INFINITY, f64::max);
+    let series = |of: fn(&Sample) -> Vec<f64>, look: fn(usize) -> Look| -> Vec<Series> {
+        let one = |(n, (start, found)): (usize, &(&str, &Regions))| Series {
+            label: format!("from the {} start", start),
+            points: found
+                .samples
+                .iter()
+                .flat_map(|s| of(s).into_iter().map(|y| (s.value, y)))
+                .collect(),
+            look: look(n),
+        };
+        sweeps.iter().enumerate().map(one).collect()
+    };
+    let axis = || {
+        let axis = AxisSpec::linear(name);
+        if first < last {
+            axis.from_to(first, last)
+        } else {
+            axis
+        }
+    };
+    let maxima = |sample: &Sample| match sample.attractor.kind.stays() {
+        false => Vec::new(),
+        true if sample.attractor.maxima_rad_per_s.is_empty() => {
+            vec![sample.attractor.yaw_rates_rad_per_s().1]
+        }
+        true => sample.attractor.maxima_rad_per_s.clone(),
+    };
+    let exponent = |sample: &Sample| sample.attractor.exponent_per_s.into_iter().collect();
+    Chart {
+        heading: format!("Kinds of motion over {name}"),
+        panels: vec![
+            Panel {
+                caption: "local maxima of the yaw rate".into(),
+                x: axis(),
+                y: AxisSpec::linear("yaw rate (rad/s)"),
+                series: series(maxima, |_| Look::Dots),
+                ..Panel::default()
+            },
+            Panel {
+                caption: "largest Lyapunov exponent".into(),
+                x: axis(),
+                y: AxisSpec::linear("exponent (1/s)"),
+                series: series(exponent, Look::Line),
+                levels: vec![0.0],
+                ..Panel::default()
+            },
+        ],
+    }
 }

@@ -59,7 +59,7 @@ impl Search {
     }
 
     /// Couplings that a bisection judges: both ends, and one for each halving.
-    pub fn couplings_tried(&self) -> u32 {
+    pub(crate) fn couplings_tried(&self) -> u32 {
         let width = self.to_per_s - self.from_per_s;
         2 + (width / self.tolerance_per_s).log2().ceil() as u32
     }

@@ -61,7 +61,7 @@ impl Trace {
 
     /// Time at which the numerical solution leaves all physical bounds, if it does, s; [`early_end`](crate::simulate::early_end) finds
     /// out why.
-    pub fn leaves_bounds_at_s(&self) -> Option<f64> {
+    pub(crate) fn leaves_bounds_at_s(&self) -> Option<f64> {
         let first = self.states.iter().position(|state| !is_bounded(&state.x))?;
         Some(self.time_s(first))
     }

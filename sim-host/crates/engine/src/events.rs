@@ -53,7 +53,7 @@ impl Guard {
     }
 
     /// The mode lasts for ever.
-    pub fn never_ends(&self) -> bool {
+    pub(crate) fn never_ends(&self) -> bool {
         *self == Self::NONE
     }
 }

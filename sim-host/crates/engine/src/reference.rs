@@ -22,7 +22,7 @@ const LONGEST_STEP_S: f64 = 0.01;
 /// Shortest step, s; where even it does not meet the tolerance, rounding is all that is left.
 const SHORTEST_STEP_S: f64 = 1e-7;
 /// To this an event's instant is found, s.
-pub const EVENT_TOLERANCE_S: f64 = 1e-12;
+pub(crate) const EVENT_TOLERANCE_S: f64 = 1e-12;
 /// Most trial instants for one event; bisection alone would need 34.
 const MOST_TRIALS: usize = 60;
 /// Steps, events included, that a run may take: at once, and per second of motion. The motions of the paper take some 150 per second.

@@ -148,7 +148,7 @@ fn tolerance(wanted_per_s: f64) -> f64 {
     4.0 / (0.5 * OBSERVED_S) + 1e-3 * wanted_per_s.abs()
 }
 
-/// Ensemble that come to rest, in all ways that there are: free and stuck, at a focus and at a node, with friction of no torque, of less
+/// Trajectories that come to rest, in all ways that there are: free and stuck, at a focus and at a node, with friction of no torque, of less
 /// than rounding, and of the paper's.
 #[test]
 fn the_exponent_at_rest_is_the_greatest_real_part() {

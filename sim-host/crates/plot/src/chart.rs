@@ -98,6 +98,31 @@ pub struct Series {
     pub look: Look,
 }
 
+/// More dots than this are drawn small: so many large ones would hide each other.
+const MOST_LARGE_DOTS: usize = 3000;
+/// Colours of dots before they repeat.
+const COLOURS: usize = 4;
+
+/// The `n`-th set of dots of a panel, to be seen one by one: a name for the legend, and each dot as a line of one point.
+pub fn large_dots(label: &str, n: usize, points: Vec<(f64, f64)>) -> Vec<Series> {
+    let named = Series {
+        label: label.into(),
+        points: points.clone(),
+        look: Look::Dots,
+    };
+    if points.len() > MOST_LARGE_DOTS {
+        return vec![named];
+    }
+    let large = |point| Series {
+        label: String::new(),
+        points: vec![point],
+        look: Look::Line(n % COLOURS),
+    };
+    std::iter::once(named)
+        .chain(points.into_iter().map(large))
+        .collect()
+}
+
 /// How points are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {

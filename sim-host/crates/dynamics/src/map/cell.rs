@@ -138,7 +138,7 @@ pub enum InvalidCell {
 
 /// The cells at some places of a plan.
 ///
-/// Ensemble run through their transients without tangent vectors. The exponent is taken over what follows but for its first tenth.
+/// Trajectories run through their transients without tangent vectors. The exponent is taken over what follows but for its first tenth.
 ///
 /// # Errors
 /// If a place's scenario is not valid, or none for the engine.

@@ -11,11 +11,11 @@ use shared_model::{InvalidScenario, Scenario};
 /// Cells of a tile: so many that no lane of the engine waits long for another.
 pub const CELLS_A_TILE: usize = 128;
 /// Most sheets of a map: one of each waveform and start.
-pub const MOST_SHEETS: usize = 6;
+pub(crate) const MOST_SHEETS: usize = 6;
 /// Longest run of a cell, s: that of a scenario.
-pub const MOST_TIME_S: f64 = 1e6;
+pub(crate) const MOST_TIME_S: f64 = 1e6;
 /// Most cells of a map: their rows take some GB.
-pub const MOST_CELLS: usize = 10_000_000;
+pub(crate) const MOST_CELLS: usize = 10_000_000;
 
 /// Equally spaced values, both ends among them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

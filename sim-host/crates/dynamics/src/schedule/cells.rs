@@ -25,7 +25,7 @@ listed! {
 
 impl Class {
     /// At rest or of period one: what a schedule is after.
-    pub fn is_calm(self) -> bool {
+    pub(crate) fn is_calm(self) -> bool {
         self <= Self::PeriodOne
     }
 

@@ -75,7 +75,7 @@ impl<S: Simd, const V: usize, const K: usize> ExactAngles<S, V, K> {
 
     /// The same of their change along tangent vector `k`. After that of the state.
     #[inline(always)]
-    pub fn tangent_angles(
+    pub(crate) fn tangent_angles(
         &mut self,
         n: usize,
         k: usize,
@@ -105,7 +105,7 @@ impl<S: Simd, const V: usize, const K: usize> ExactAngles<S, V, K> {
 
     /// The same along tangent vector `k`.
     #[inline(always)]
-    pub fn turn_tangent(
+    pub(crate) fn turn_tangent(
         &mut self,
         n: usize,
         k: usize,

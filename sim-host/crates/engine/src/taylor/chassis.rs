@@ -28,7 +28,7 @@ impl<S: Simd, const V: usize> Chassis<Lanes<S, V>> {
         }
     }
 
-    pub fn set_lane(&mut self, lane: usize, model: &Model<f64>) {
+    pub(crate) fn set_lane(&mut self, lane: usize, model: &Model<f64>) {
         let constants = model.constants();
         self.front_lever_s.as_mut_slice()[lane] = constants.front_lever_s;
         self.rear_lever_s.as_mut_slice()[lane] = -constants.rear_lever_s;

@@ -76,18 +76,18 @@ impl<S: Simd, const V: usize, const K: usize, E: Equation> Expansion<S, V, K, E>
     }
 
     /// Puts a motion's numbers into its lane.
-    pub fn set_lane(&mut self, lane: usize, model: &Model<f64>, injection: Injection<f64>) {
+    pub(crate) fn set_lane(&mut self, lane: usize, model: &Model<f64>, injection: Injection<f64>) {
         self.chassis.set_lane(lane, model);
         self.forces.set_lane(lane, model, injection);
     }
 
     /// Puts those of its friction mode into its lane.
-    pub fn set_mode(&mut self, lane: usize, model: &Model<f64>, mode: FrictionMode) {
+    pub(crate) fn set_mode(&mut self, lane: usize, model: &Model<f64>, mode: FrictionMode) {
         self.steering.set_lane(lane, model, mode);
     }
 
     /// Nothing acts in a lane; its motion, if it has one, is to be at rest.
-    pub fn free_lane(&mut self, lane: usize) {
+    pub(crate) fn free_lane(&mut self, lane: usize) {
         self.forces.free_lane(lane);
         self.steering.acceleration.as_mut_slice()[lane] = 0.0;
     }

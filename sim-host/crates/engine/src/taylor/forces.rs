@@ -38,14 +38,14 @@ impl<S: Simd, const V: usize, const K: usize, E: Equation> Forces<S, V, K, E> {
     }
 
     /// Puts a motion's tyres into its lane.
-    pub fn set_lane(&mut self, lane: usize, model: &Model<f64>, injection: Injection<f64>) {
+    pub(crate) fn set_lane(&mut self, lane: usize, model: &Model<f64>, injection: Injection<f64>) {
         let (front, rear) = model.tires();
         self.front_tires.set_lane(lane, front, injection);
         self.rear_tires.set_lane(lane, rear, injection);
     }
 
     /// No forces in a lane.
-    pub fn free_lane(&mut self, lane: usize) {
+    pub(crate) fn free_lane(&mut self, lane: usize) {
         self.front_tires.free_lane(lane);
         self.rear_tires.free_lane(lane);
     }
@@ -84,7 +84,7 @@ impl<S: Simd, const V: usize, const K: usize, E: Equation> Forces<S, V, K, E> {
 
     /// Coefficient `n` of its change along tangent vector `k`, given the vector's up to `n`. After that of the state.
     #[inline(always)]
-    pub fn load_tangent(
+    pub(crate) fn load_tangent(
         &mut self,
         n: usize,
         k: usize,
@@ -109,7 +109,7 @@ impl<S: Simd, const V: usize, const K: usize, E: Equation> Forces<S, V, K, E> {
 
     /// Series of the front tyres' force, up to the coefficient before the last.
     #[inline(always)]
-    pub fn front_force(&self) -> &Series<S, V> {
+    pub(crate) fn front_force(&self) -> &Series<S, V> {
         &self.front.force
     }
 }

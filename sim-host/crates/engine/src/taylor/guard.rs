@@ -33,14 +33,14 @@ impl<S: Simd, const V: usize> Guards<Lanes<S, V>> {
     }
 
     /// Takes a lane's bounds away.
-    pub fn free_lane(&mut self, lane: usize) {
+    pub(crate) fn free_lane(&mut self, lane: usize) {
         self.lower.as_mut_slice()[lane] = f64::NEG_INFINITY;
         self.upper.as_mut_slice()[lane] = f64::INFINITY;
         self.per_force.as_mut_slice()[lane] = 0.0;
     }
 
     /// Puts the bounds of a motion's mode into its lane.
-    pub fn set_lane(
+    pub(crate) fn set_lane(
         &mut self,
         lane: usize,
         model: &Model<f64>,
@@ -102,7 +102,7 @@ impl<S: Simd, const V: usize> Guards<Lanes<S, V>> {
 
     /// The first instant within `most_s` at which a lane's quantity leaves its bounds, and the bound.
     #[inline(always)]
-    pub fn first_end(
+    pub(crate) fn first_end(
         &self,
         lane: usize,
         argument: &Series<S, V>,

@@ -45,7 +45,7 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
 
     /// The same number in all lanes.
     #[inline(always)]
-    pub fn splat(simd: S, value: f64) -> Self {
+    pub(crate) fn splat(simd: S, value: f64) -> Self {
         let vectors = [simd.splat_f64s(value); V];
         Self { simd, vectors }
     }
@@ -86,7 +86,7 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
 
     /// Lanes with a number of at most zero, in their order.
     #[inline(always)]
-    pub fn at_most_zero(&self) -> LaneSet {
+    pub(crate) fn at_most_zero(&self) -> LaneSet {
         let mut bits = 0;
         for lane in 0..Self::COUNT {
             bits |= u32::from(self.as_slice()[lane] <= 0.0) << lane;
@@ -96,7 +96,7 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
 
     /// `self * factor + sum`, rounded once.
     #[inline(always)]
-    pub fn mul_add(self, factor: Self, sum: Self) -> Self {
+    pub(crate) fn mul_add(self, factor: Self, sum: Self) -> Self {
         let mut result = sum;
         for v in 0..V {
             result.vectors[v] =
@@ -169,7 +169,7 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
 
     /// `yes` where this is less than `bound`, elsewhere `no`.
     #[inline(always)]
-    pub fn select_less(self, bound: Self, yes: Self, no: Self) -> Self {
+    pub(crate) fn select_less(self, bound: Self, yes: Self, no: Self) -> Self {
         let mut result = no;
         for v in 0..V {
             let simd = self.simd;
@@ -181,7 +181,7 @@ impl<S: Simd, const V: usize> Lanes<S, V> {
 
     /// This is less than `bound` in every lane.
     #[inline(always)]
-    pub fn all_less(self, bound: Self) -> bool {
+    pub(crate) fn all_less(self, bound: Self) -> bool {
         let mut all = true;
         for v in 0..V {
             let less = self.simd.less_than_f64s(self.vectors[v], bound.vectors[v]);
