@@ -1,7 +1,7 @@
 //! The report as one HTML page that needs nothing beside it.
 
-use super::ReportInput;
 use super::figure::Figure;
+use super::input::ReportInput;
 use maud::{Markup, PreEscaped, html};
 use plot::page;
 use plot::text::{by_run, counts, limit, measured, run_of, status_word};

@@ -1,6 +1,6 @@
 //! Made-up runs of realistic shape, for tests.
 
-use super::{Pair, ReportInput, RunReport};
+use super::input::{Pair, ReportInput, RunReport};
 use dynamics::trace::Trace;
 use nalgebra::Vector4;
 use pil::instructions::Instructions;

@@ -1,7 +1,7 @@
 //! What the print gets wrong or leaves open, each with the experiment that shows it.
 
-use super::piece::{Material, Named};
-use super::{Made, Quality};
+use super::job::Quality;
+use super::material::{Made, Material, Named};
 use dynamics::attractor::attractor;
 use dynamics::sweep::{RunControl, SweepError, Timing};
 use engine::is_bounded;

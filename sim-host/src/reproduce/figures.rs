@@ -1,7 +1,7 @@
 //! Figures 12 and 17, and the averaged system against the true signal.
 
-use super::piece::{Drawing, Material, Named, Table};
-use super::{Made, Quality};
+use super::job::Quality;
+use super::material::{Drawing, Made, Material, Named, Table};
 use dynamics::averaging;
 use dynamics::period::{TOLERANCE, period};
 use dynamics::simulate::{settle, simulate, started_at};

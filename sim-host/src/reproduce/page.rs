@@ -1,8 +1,9 @@
 //! The page over all pieces.
 
-use super::claims::{Judgement, says};
-use super::piece::Product;
-use super::{Options, Quality};
+use super::claims::says;
+use super::job::{Options, Quality};
+use super::material::Judgement;
+use super::product::Product;
 use crate::paper::Reproduced;
 use anyhow::Context;
 use files::output::{make_folder, write_json, write_text};

@@ -1,8 +1,9 @@
 //! Sweeps over the speed and over the dither's amplitude: the diagrams of Figures 6, 7, 8 and 13, and the claims on them.
 
+use super::claims;
 use super::figures::name_of;
-use super::piece::{Drawing, Material, Named, Table};
-use super::{Made, Quality, claims};
+use super::job::Quality;
+use super::material::{Drawing, Made, Material, Named, Table};
 use crate::paper::REGION_EDGES_RPM;
 use dynamics::regions::{Regions, regions};
 use dynamics::sweep::{Parameter, RunControl, SweepError, Timing, Values};

@@ -1,6 +1,6 @@
 //! Distance of the f32 and f64 runs against time.
 
-use crate::report::RunReport;
+use crate::report::input::RunReport;
 use plot::axes::{Axes, stack, stack_height};
 use plot::axis::Axis;
 use plot::canvas::{Area, Line};

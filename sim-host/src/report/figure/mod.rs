@@ -7,7 +7,7 @@ mod phase_portrait;
 mod pwm_trace;
 mod time_response;
 
-use super::ReportInput;
+use crate::report::input::ReportInput;
 
 /// A figure of the report.
 #[derive(Debug, Clone)]
@@ -97,11 +97,12 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Pair, sample};
+    use crate::report::input::{Pair, RunReport};
+    use crate::report::sample;
     use nalgebra::Vector4;
 
     /// All figures of one run paired with itself.
-    fn figures_of(run: crate::report::RunReport) -> Vec<Figure> {
+    fn figures_of(run: RunReport) -> Vec<Figure> {
         let verdict = sample::verdict();
         let pairs = [Pair {
             title: "with itself".into(),
