@@ -3,6 +3,7 @@
 mod figure;
 mod html;
 mod input;
+mod question;
 #[cfg(test)]
 mod sample;
 

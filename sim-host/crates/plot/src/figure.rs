@@ -36,7 +36,7 @@ pub fn figure(
     let rows = places.last().map_or(0, |(_, row)| row + 1);
     let legend_top = MARGIN + HEADING_STEP * heading_lines.len() as i32;
     let top = legend_top + LEGEND_STEP * rows + MARGIN / 2;
-    let size = (WIDTH, top + height);
+    let size = (WIDTH, top + height + MARGIN / 2);
 
     let canvas = Canvas::default();
     let whole = canvas.area(size.0, size.1);
