@@ -245,7 +245,7 @@ fn exponents(sweep: &Regions, from: f64, to: f64, kind: Kind) -> String {
 }
 
 /// The claim's own words.
-pub fn says(claim: &str) -> (&'static str, &'static str) {
+pub fn says(claim: &str) -> &'static str {
     let known = CLAIMS.iter().find(|known| known.id == claim);
-    known.map_or(("", ""), |known| (known.says, known.place))
+    known.map_or("", |known| known.says)
 }

@@ -21,41 +21,71 @@ const DITHERED_RPM: f64 = 1750.0;
 
 /// An error or a gap of the print.
 struct Erratum {
+    /// Number in `docs/paper.md`.
+    id: &'static str,
     title: &'static str,
+    /// The print, in this project's words.
+    claim: &'static str,
+    /// The reading of this project.
+    correction: &'static str,
     experiment: fn(&Experiment) -> Result<String, SweepError>,
 }
 
 const ERRATA: [Erratum; 8] = [
     Erratum {
+        id: "E1",
         title: "Table 1's labels of the roads are swapped",
+        claim: "set A of Table 1 is labelled high friction, set B low friction",
+        correction: "set A is the low-friction road, on which the results are",
         experiment: road_labels,
     },
     Erratum {
+        id: "E1",
         title: "Set B with the cubic tyre",
+        claim: "the cubic tyre is given for both roads",
+        correction: "only set A has a bounded cubic characteristic",
         experiment: cubic_set_b,
     },
     Erratum {
+        id: "E2",
         title: "Sign of the cornering force",
+        claim: "D > 0 for both axles",
+        correction: "as printed",
         experiment: force_sign,
     },
     Erratum {
+        id: "E3",
         title: "(14) misprints its first line",
+        claim: "the first line of (14) multiplies by x2",
+        correction: "subtract x2, as (1) and (20) do",
         experiment: first_line,
     },
     Erratum {
+        id: "E5",
         title: "Friction by the sign of the angle, as (13) prints it, or of the rate",
+        claim: "(13) has the sign of the steering angle",
+        correction: "the sign of the steering rate",
         experiment: friction_laws,
     },
     Erratum {
+        id: "E7",
         title: "Starts are not given, and there are several attractors",
+        claim: "no initial state is given",
+        correction: "the preset gives the initial state",
         experiment: starts,
     },
     Erratum {
+        id: "E8",
         title: "The dither's volts enter an angle",
+        claim: "a voltage is added to an angle",
+        correction: "gains in rad/V: 1 for the square wave, 1/(2 pi) for the sine",
         experiment: volts,
     },
     Erratum {
+        id: "E9",
         title: "Dither in the friction term",
+        claim: "open: whether the dither acts on the friction term",
+        correction: "none: the choice does not decide the result",
         experiment: dithered_friction,
     },
 ];
@@ -72,7 +102,13 @@ pub fn errata(named: &Named, quality: Quality, watch: RunControl) -> Made {
     };
     let finding = |erratum: &Erratum| {
         let measured = (erratum.experiment)(&experiment)?;
-        Ok((erratum.title.into(), measured))
+        Ok((
+            format!("{}: {}", erratum.id, erratum.title),
+            format!(
+                "print: {}; correction: {}; measured: {measured}",
+                erratum.claim, erratum.correction
+            ),
+        ))
     };
     Ok(Material {
         findings: ERRATA

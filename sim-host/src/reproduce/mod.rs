@@ -72,7 +72,7 @@ pub fn reproduce(
         .flat_map(|product: &Product| product.judgements.clone())
         .collect();
     judgements.sort_by(|a, b| a.claim.cmp(&b.claim));
-    page::write(folder, options, &products, &judgements)?;
+    page::write(folder, options, &pieces, &products, &judgements)?;
     Ok(Summary {
         judgements,
         complete: products.len() == of,

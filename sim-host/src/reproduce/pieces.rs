@@ -14,6 +14,8 @@ pub struct Piece {
     pub name: String,
     /// Name for people.
     pub title: String,
+    /// Ids of the paper's claims that its figures show.
+    pub claims: &'static [&'static str],
     /// Its share of the time.
     pub weight: f64,
     /// The preset or vehicle.
@@ -26,6 +28,7 @@ pub struct Piece {
 struct Part {
     name: &'static str,
     title: &'static str,
+    claims: &'static [&'static str],
     /// Its share of the time, measured in seconds on two cores at full quality: with the engine, and with the fixed step.
     weights: [f64; 2],
     make: fn(&Named, Quality, RunControl) -> Made,
@@ -34,12 +37,14 @@ struct Part {
 const fn part(
     name: &'static str,
     title: &'static str,
+    claims: &'static [&'static str],
     weights: [f64; 2],
     make: fn(&Named, Quality, RunControl) -> Made,
 ) -> Part {
     Part {
         name,
         title,
+        claims,
         weights,
         make,
     }
@@ -49,6 +54,7 @@ const fn part(
 const ONCE: [Part; 1] = [part(
     "sensitivity",
     "How the edges move",
+    &[],
     [2.3, 2.3],
     sensitivity::sensitivity,
 )];
@@ -57,60 +63,70 @@ const PARTS: [Part; 10] = [
     part(
         "characteristics",
         "Figures 2, 9 to 11 and 14 to 16: tyres and effective nonlinearities; realisability",
+        &[],
         [0.1, 0.1],
         characteristics::characteristics,
     ),
     part(
         "speed",
         "Figures 6 and 7: sweep over the speed",
+        &["C1", "C2", "C3", "C4"],
         [0.3, 12.8],
         sweeps::speed,
     ),
     part(
         "square",
         "Figure 8: sweep over the square dither's amplitude",
+        &["C5", "C6"],
         [0.1, 6.6],
         sweeps::square,
     ),
     part(
         "sine",
         "Figure 13: sweep over the sine dither's amplitude",
+        &["C7", "C8"],
         [0.2, 9.1],
         sweeps::sine,
     ),
     part(
         "suppression",
         "Figures 12 and 17: chaos suppressed",
+        &["C6", "C8"],
         [0.1, 0.1],
         figures::suppression,
     ),
     part(
         "exponents",
         "All Lyapunov exponents, by three methods",
+        &[],
         [8.5, 10.9],
         measures::exponents,
     ),
     part(
         "lengths",
         "How long is long enough",
+        &[],
         [0.5, 8.4],
         measures::lengths,
     ),
     part(
         "motion",
         "Poincar\u{e9} section and frequency spectrum",
+        &[],
         [0.2, 0.3],
         measures::motion,
     ),
     part(
         "averaging",
         "Averaging against the true signal",
+        &[],
         [5.5, 5.0],
         figures::averaging,
     ),
     part(
         "errata",
         "What the print gets wrong",
+        &[],
         [0.7, 1.1],
         errata::errata,
     ),
@@ -126,6 +142,7 @@ pub fn all(options: &Options) -> Vec<Piece> {
             pieces.push(Piece {
                 name: format!("{}-{name}", part.name),
                 title: format!("{} ({name})", part.title),
+                claims: part.claims,
                 weight: part.weights[usize::from(!by_engine)],
                 scenario: Named {
                     name: name.clone(),

@@ -70,7 +70,7 @@ tbody th { font-weight: normal; }
 .matrix td a:hover, .matrix td a:focus-visible { text-decoration: underline; }
 .matrix .symbol { font-weight: bold; }
 .matrix .none { padding: 0.25rem 0.5rem; color: var(--faint); }
-.matrix.many td, .matrix.many thead th { white-space: nowrap; }
+.matrix td, .matrix thead th + th { white-space: nowrap; }
 .unseen { position: absolute; width: 1px; height: 1px; overflow: hidden; clip-path: inset(50%); white-space: nowrap; }
 .checks tbody + tbody { border-top: 2px solid var(--rule); }
 :target { outline: 3px solid var(--link); outline-offset: -1px; }
@@ -91,7 +91,8 @@ figure { margin: 1rem 0 2rem; break-inside: avoid; }
 figcaption { font-size: 0.95rem; color: var(--faint); margin-top: 0.3rem; }
 @media (max-width: 44rem) {
   body { padding: 0.6rem; }
-  .matrix.many { font-size: 0.85rem; }
+  .matrix { font-size: 0.85rem; }
+  .matrix th { padding-left: 0; }
   .matrix.many thead th + th { height: 7.5rem; padding: 0.3rem 0; text-align: center; }
   .matrix.many thead th + th span { writing-mode: vertical-rl; transform: rotate(180deg); }
   .matrix.many th { padding: 0.2rem 0.3rem 0.2rem 0; }
