@@ -72,7 +72,10 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
     let runs = input.runs.iter();
     let runs = runs.map(|run| (run.title.as_str(), &run.instructions));
     let drives = input.drives.iter();
-    let drives = drives.map(|driven| (driven.title.as_str(), &driven.instructions));
+    let drives = drives.map(|driven| {
+        let title = driven.title.trim_end_matches(" as scheduled");
+        (title, &driven.instructions)
+    });
     let rows: Vec<_> = runs.chain(drives).collect();
     figures.push(Figure {
         name: "instructions".into(),
@@ -88,7 +91,8 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
                 "{}. The vehicle on the host, the ECU on the emulated target, one exchange a PWM period.",
                 driven.title
             ),
-            svg: pil::figure::draw(&driven.title, &driven.run),
+            // The heading names the loop itself.
+            svg: pil::figure::draw(driven.title.trim_start_matches("in the loop, "), &driven.run),
         });
     }
     figures
