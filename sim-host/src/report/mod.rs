@@ -2,91 +2,23 @@
 
 mod figure;
 mod html;
+mod input;
+mod question;
 #[cfg(test)]
 mod sample;
 
+pub use input::{DriveReport, Pair, ReportInput, RunReport};
+
 use anyhow::ensure;
-use dynamics::trace::Trace;
 use files::output::{make_folder, write_text};
-use pil::instructions::Instructions;
-use pil::run::Run;
 use plot::junit;
-use plot::verdict::Verdict;
 use std::path::Path;
-
-/// What the report shows of one run on the ECU.
-#[derive(Debug, Clone)]
-pub struct RunReport {
-    /// Name for file names: lower case, digits and hyphens.
-    pub id: String,
-    /// Name for people, for instance `1750 rpm, square dither 0.1 V`.
-    pub title: String,
-    /// The firmware's telemetry.
-    pub trace: Trace,
-    /// When the dither sets in, s; none without dither.
-    pub dither_start_s: Option<f64>,
-    /// Volts of a duty code: (code - period/2) times this.
-    pub volts_per_count: f64,
-    /// Time (s) and defect of each step over its bound (at most 1 passes): host f64 step from the firmware's state.
-    pub one_step_defect: Vec<(f64, f64)>,
-    /// Time (s) and distance of free f32 and f64 runs, relative to the attractor's size.
-    pub divergence: Vec<(f64, f64)>,
-    /// When they are predicted to part, s: least, expected, greatest; none where they must never part.
-    pub horizon_s: Option<[f64; 3]>,
-    /// Distance at which they count as parted, or which they must never reach.
-    pub divergence_limit: f64,
-    /// What its tasks took.
-    pub instructions: Instructions,
-}
-
-/// Two runs that differ in nothing but the dither.
-#[derive(Debug, Clone)]
-pub struct Pair {
-    /// Name for people, for instance `1750 rpm: no dither against square dither 0.1 V`.
-    pub title: String,
-    /// Index of the run without dither.
-    pub before: usize,
-    /// Index of the run with dither.
-    pub after: usize,
-}
-
-/// What the report shows of a manoeuvre with the ECU in the loop.
-#[derive(Debug, Clone)]
-pub struct DriveReport {
-    /// Name for file names: lower case, digits and hyphens.
-    pub id: String,
-    /// Name for people.
-    pub title: String,
-    /// The firmware's run.
-    pub run: Run,
-    /// Instructions of its tasks.
-    pub instructions: Instructions,
-}
 
 /// The files of a report but for its figures.
 pub const FILES: [&str; 3] = ["verdict.json", "junit.xml", "index.html"];
 
 /// The folder of its figures.
 pub const FIGURES: &str = "figures";
-
-/// Everything that a report shows.
-#[derive(Debug, Clone, Copy)]
-pub struct ReportInput<'a> {
-    /// Heading of the page and name of the test suite.
-    pub title: &'a str,
-    /// The checks.
-    pub verdict: &'a Verdict,
-    /// The runs on the ECU; those named in check ids behind the `/` give the groups their titles.
-    pub runs: &'a [RunReport],
-    /// The runs to be shown before and after.
-    pub pairs: &'a [Pair],
-    /// Manoeuvres with the ECU in the loop.
-    pub drives: &'a [DriveReport],
-    /// Name and text of recorded proofs about the firmware.
-    pub proofs: &'a [(String, String)],
-    /// Name and value of further facts: memory use, toolchain, revision.
-    pub notes: &'a [(String, String)],
-}
 
 /// Writes `index.html`, `verdict.json`, `junit.xml` and `figures/*.svg` into the directory, which is
 /// made if it is missing. Files of these names are replaced, each at once; `index.html` comes last.

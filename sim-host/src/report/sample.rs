@@ -1,6 +1,6 @@
 //! Made-up runs of realistic shape, for tests.
 
-use super::{Pair, ReportInput, RunReport};
+use super::input::{Pair, ReportInput, RunReport};
 use dynamics::trace::Trace;
 use nalgebra::Vector4;
 use pil::instructions::Instructions;
@@ -21,7 +21,7 @@ pub fn verdict() -> Verdict {
         Check::equals("bits/1750-none", "State words that differ", 0.0, 0.0)
             .detail("240000 words and 600000 duty codes compared"),
         Check::at_most(
-            "step/1750-none",
+            "one-step/1750-none",
             "Greatest one-step defect over its bound",
             0.37,
             1.0,
@@ -30,13 +30,13 @@ pub fn verdict() -> Verdict {
         Check::within("horizon/1750-none", "f32 and f64 part", 38.2, (30.0, 46.0)).unit("s"),
         Check::equals("bits/1750-square", "State words that differ", 0.0, 0.0),
         Check::at_most(
-            "bounded/1750-square",
+            "horizon/1750-square",
             "Distance of free f32 and f64 runs",
             3.2e-6,
             1e-3,
         ),
         Check::at_most(
-            "step/1750-square",
+            "one-step/1750-square",
             "Greatest one-step defect over its bound, with a title that takes more than one line",
             1.7,
             1.0,

@@ -1,8 +1,8 @@
 //! Figures 2, 9 to 11 and 14 to 16, and what of the dither an actuator can produce.
 
 use super::figures::name_of;
-use super::piece::{Drawing, Material, Named, csv_of};
-use super::{Made, Quality};
+use super::job::Quality;
+use super::material::{Drawing, Made, Material, Named, csv_of};
 use dynamics::characteristics::{nonlinearities, nonlinearities_chart, tires, tires_chart};
 use dynamics::realisability::{Amplitudes, bode_chart, demands, responses};
 use dynamics::sweep::RunControl;

@@ -1,24 +1,9 @@
 //! The paper's claims held against what was measured.
 
+use super::material::Judgement;
 use crate::paper::{CLAIMS, REGION_EDGES_RPM, Reproduced, chaos_begins_at};
 use dynamics::attractor::Kind;
 use dynamics::regions::{Regions, Sample};
-use serde::{Deserialize, Serialize};
-
-/// A claim with its judgement under one preset.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Judgement {
-    /// The claim's number.
-    pub claim: String,
-    /// The preset.
-    pub preset: String,
-    /// What was measured, with its uncertainty.
-    pub measured: String,
-    /// How far that is from the claim.
-    pub distance: String,
-    /// The verdict.
-    pub verdict: Reproduced,
-}
 
 /// A region's edge counts as the paper's within 1 % of it.
 const EDGE_SHARE: f64 = 0.01;
@@ -260,7 +245,7 @@ fn exponents(sweep: &Regions, from: f64, to: f64, kind: Kind) -> String {
 }
 
 /// The claim's own words.
-pub fn says(claim: &str) -> (&'static str, &'static str) {
+pub fn says(claim: &str) -> &'static str {
     let known = CLAIMS.iter().find(|known| known.id == claim);
-    known.map_or(("", ""), |known| (known.says, known.place))
+    known.map_or("", |known| known.says)
 }

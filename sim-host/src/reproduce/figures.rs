@@ -1,7 +1,7 @@
 //! Figures 12 and 17, and the averaged system against the true signal.
 
-use super::piece::{Drawing, Material, Named, Table};
-use super::{Made, Quality};
+use super::job::Quality;
+use super::material::{Drawing, Made, Material, Named, Table};
 use dynamics::averaging;
 use dynamics::period::{TOLERANCE, period};
 use dynamics::simulate::{settle, simulate, started_at};
@@ -100,7 +100,7 @@ fn chart(number: &str, before: &Trace, after: &Trace, start_s: f64) -> Chart {
                 x: AxisSpec::linear("time (s)").from_to(0.0, SHOWN_S),
                 y: AxisSpec::linear("sideslip angle (rad)"),
                 series: vec![
-                    series("without dither", 2, points(before, SHOWN_S)),
+                    series("without dither", 5, points(before, SHOWN_S)),
                     series("with dither", 0, points(after, SHOWN_S)),
                 ],
                 instants: vec![(start_s, "dither on".into())],
@@ -109,7 +109,7 @@ fn chart(number: &str, before: &Trace, after: &Trace, start_s: f64) -> Chart {
             Panel {
                 x: AxisSpec::linear("sideslip angle (rad)"),
                 y: AxisSpec::linear("yaw rate (rad/s)"),
-                series: vec![series("", 2, orbit(before)), series("", 0, orbit(after))],
+                series: vec![series("", 5, orbit(before)), series("", 0, orbit(after))],
                 ..Panel::default()
             },
         ],

@@ -1,8 +1,8 @@
 //! What the paper only mentions: all Lyapunov exponents, the Poincaré section and the frequency spectrum; and its own method for
 //! the largest exponent beside two others.
 
-use super::piece::{Drawing, Material, Named, Table, csv_of};
-use super::{Made, Quality};
+use super::job::Quality;
+use super::material::{Drawing, Made, Material, Named, Table, csv_of};
 use dynamics::attractor::{Attractor, attractors};
 use dynamics::component::Component;
 use dynamics::component::panel_of_states;

@@ -5,71 +5,26 @@ mod characteristics;
 mod claims;
 mod errata;
 mod figures;
+mod job;
+mod material;
 mod measures;
 mod page;
-mod piece;
+mod pieces;
+mod product;
 mod sensitivity;
 mod sweeps;
 
-pub use claims::Judgement;
+pub use job::{Options, Progress, Quality, Summary};
+pub use material::Judgement;
 pub use page::CLAIMS;
 #[doc(hidden)]
-pub use piece::Product;
+pub use product::Product;
 
 use anyhow::Context;
-use dynamics::sweep::{RunControl, SweepError};
-use piece::Piece;
-use shared_model::Scenario;
+use dynamics::sweep::RunControl;
+use pieces::Piece;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// How finely to look.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Quality {
-    /// Coarse sweeps and short runs: a look at everything in seconds.
-    Quick,
-    /// As the claims need.
-    Full,
-}
-
-/// What to reproduce, and how.
-#[derive(Debug, Clone)]
-pub struct Options {
-    /// How finely to look.
-    pub quality: Quality,
-    /// Preset or vehicle, by name; each is judged by itself.
-    pub scenarios: Vec<(String, Scenario<f64>)>,
-}
-
-/// How far the reproduction is.
-#[derive(Debug, Clone)]
-pub enum Progress {
-    /// That piece of so many begins.
-    Begins {
-        /// Its number, from 1.
-        number: usize,
-        /// How many there are.
-        of: usize,
-        /// What it is.
-        title: String,
-        /// It was made by an earlier run and is kept.
-        kept: bool,
-        /// Share of this run's work that is done, from 0 to 1.
-        done: f64,
-    },
-    /// A point of the present piece is done.
-    Point,
-}
-
-/// What came out.
-#[derive(Debug)]
-pub struct Summary {
-    /// All judgements, by claim and preset.
-    pub judgements: Vec<Judgement>,
-    /// Everything was made; otherwise the user has stopped it, and another run goes on from here.
-    pub complete: bool,
-}
 
 /// Makes what is not yet in `folder`, and the page over all of it.
 ///
@@ -82,7 +37,7 @@ pub fn reproduce(
     on_progress: &(dyn Fn(Progress) + Sync),
 ) -> anyhow::Result<Summary> {
     page::begin(folder)?;
-    let pieces = piece::all(options);
+    let pieces = pieces::all(options);
     let of = pieces.len();
     let mut products = Vec::with_capacity(of);
     let kept: Vec<Option<Product>> = pieces
@@ -117,7 +72,7 @@ pub fn reproduce(
         .flat_map(|product: &Product| product.judgements.clone())
         .collect();
     judgements.sort_by(|a, b| a.claim.cmp(&b.claim));
-    page::write(folder, options, &products, &judgements)?;
+    page::write(folder, options, &pieces, &products, &judgements)?;
     Ok(Summary {
         judgements,
         complete: products.len() == of,
@@ -145,6 +100,3 @@ fn make(
     }
     Ok(Some(piece.write(folder, options, made)?))
 }
-
-/// A point of a sweep that cannot be made is an error of the whole.
-type Made = Result<piece::Material, SweepError>;

@@ -1,7 +1,7 @@
 //! How the edges of the paper's regions move with what the paper does not give.
 
-use super::piece::{Drawing, Material, Named, Table};
-use super::{Made, Quality};
+use super::job::Quality;
+use super::material::{Drawing, Made, Material, Named, Table};
 use crate::paper::{REGION_EDGES_RPM, chaos_begins_at};
 use dynamics::regions::{Edge, Regions, regions};
 use dynamics::sweep::{Parameter, RunControl, SweepError, Timing, Values};

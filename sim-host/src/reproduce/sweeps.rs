@@ -1,8 +1,9 @@
 //! Sweeps over the speed and over the dither's amplitude: the diagrams of Figures 6, 7, 8 and 13, and the claims on them.
 
+use super::claims;
 use super::figures::name_of;
-use super::piece::{Drawing, Material, Named, Table};
-use super::{Made, Quality, claims};
+use super::job::Quality;
+use super::material::{Drawing, Made, Material, Named, Table};
 use crate::paper::REGION_EDGES_RPM;
 use dynamics::regions::{Regions, regions};
 use dynamics::sweep::{Parameter, RunControl, SweepError, Timing, Values};
@@ -66,7 +67,10 @@ pub fn speed(named: &Named, quality: Quality, watch: RunControl) -> Made {
             "Figure 7: orbit diagram over the wheel speed",
             &sweep,
             Parameter::Speed,
-            shaded,
+            Panel {
+                regions: shaded,
+                ..Panel::default()
+            },
         ),
         csv: orbit_table(&sweep, "wheel_speed_rpm").csv(),
     };
@@ -136,11 +140,36 @@ fn amplitude(
             ),
             &sweep,
             Parameter::Amplitude,
-            Vec::new(),
+            claimed(waveform),
         ),
         csv: orbit_table(&sweep, "dither_amplitude_v").csv(),
     };
     Ok((sweep, drawing))
+}
+
+/// A panel with the amplitudes for which the paper claims period-one motion.
+fn claimed(waveform: Waveform) -> Panel {
+    let mut panel = Panel::default();
+    match waveform {
+        Waveform::Square => panel
+            .instants
+            .push((0.1, "paper: period 1 at 0.1 V".into())),
+        Waveform::Sine => {
+            // Every second region is shaded.
+            let unclaimed = Region {
+                to: 0.8,
+                ..Region::default()
+            };
+            let period_one = Region {
+                from: 0.8,
+                to: 1.2,
+                label: "paper: period 1 from 0.8 to 1.2 V".into(),
+            };
+            panel.regions = vec![unclaimed, period_one];
+        }
+        Waveform::None => {}
+    }
+    panel
 }
 
 fn sweep(
@@ -200,12 +229,7 @@ fn exponent_table(sweep: &Regions) -> Table {
     table
 }
 
-fn orbit_chart(
-    heading: &str,
-    sweep: &Regions,
-    parameter: Parameter,
-    regions: Vec<Region>,
-) -> Chart {
+fn orbit_chart(heading: &str, sweep: &Regions, parameter: Parameter, claimed: Panel) -> Chart {
     let maxima = |sample: &dynamics::regions::Sample| {
         let value = sample.value;
         let heights = sample.attractor.maxima_rad_per_s.clone();
@@ -221,8 +245,7 @@ fn orbit_chart(
                 points: sweep.samples.iter().flat_map(maxima).collect(),
                 look: Look::Dots,
             }],
-            regions,
-            ..Panel::default()
+            ..claimed
         }],
     }
 }

@@ -10,9 +10,9 @@ use std::collections::BTreeSet;
 /// Height of the line above the axes that holds their caption.
 pub const CAPTION: i32 = 42;
 /// Height below the axes that their tick labels need.
-pub const TICKS: i32 = 44;
+pub const TICKS: i32 = 50;
 /// Height below the axes that their tick labels and the name of the horizontal axis need.
-pub const TICKS_AND_NAME: i32 = 86;
+pub const TICKS_AND_NAME: i32 = 90;
 /// Room left of the axes, for tick labels and the name of the vertical axis.
 pub const BESIDE: i32 = 140;
 /// Room right of the axes.
@@ -74,7 +74,7 @@ impl<'a> Axes<'a> {
         axes.draw_grid();
         let names = TextStyle::new(TEXT_FONT, INK).anchored(Anchor::Middle);
         let centre = (axes.area.width() / 2, axes.area.height() / 2);
-        let name_middle = axes.area.height() + TICKS_AND_NAME - 4 - TEXT_FONT as i32 / 2;
+        let name_middle = axes.area.height() + TICKS_AND_NAME - 8 - TEXT_FONT as i32 / 2;
         axes.area.text(&axes.x.name, (centre.0, name_middle), names);
         let name_middle = -BESIDE + 6 + TEXT_FONT as i32 / 2;
         axes.area
@@ -285,7 +285,7 @@ mod tests {
     #[test]
     fn only_long_captions_are_shortened() {
         assert_eq!(shortened("caption", 200), "caption");
-        assert_eq!(shortened("caption", 60), "cap\u{2026}");
+        assert_eq!(shortened("caption", 75), "cap\u{2026}");
         assert_eq!(shortened("caption", 0), "");
     }
 }

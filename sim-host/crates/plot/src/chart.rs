@@ -3,7 +3,7 @@
 use crate::axes::{Axes, BESIDE, CAPTION, RIGHT, TICKS, TICKS_AND_NAME, shortened};
 use crate::axis::{Axis, bounds};
 use crate::canvas::{Anchor, Area, Line, TextStyle};
-use crate::figure::{Sample, figure};
+use crate::figure::{Sample, draw_legend, figure, legend_height};
 use crate::reduce::{Point, curve};
 use crate::style::{DOTS, INK, INSTANT, LEVEL, RUNS, TEXT_FONT, WIDTH, text_width};
 
@@ -187,23 +187,20 @@ impl Chart {
         })
     }
 
-    fn legend(&self) -> Vec<(String, Sample)> {
-        let mut legend: Vec<(String, Sample)> = Vec::new();
-        for panel in &self.panels {
-            for (series, line) in panel.styled() {
-                let known = legend.iter().any(|(label, _)| *label == series.label);
-                if !series.label.is_empty() && !known {
-                    let sample = match series.look {
-                        Look::Line(_) => Sample::Line(line),
-                        Look::Dots => Sample::Dot(line),
-                    };
-                    legend.push((series.label.clone(), sample));
-                }
-            }
+    /// The legend of the figure; empty if its panels differ in their legends and have their own.
+    fn legend(&self) -> Legend {
+        let mut legends = self.panels.iter().map(Panel::legend);
+        let mut legends: Vec<Legend> = legends.by_ref().filter(|own| !own.is_empty()).collect();
+        legends.dedup();
+        match legends.len() {
+            1 => legends.remove(0),
+            _ => Vec::new(),
         }
-        legend
     }
 }
+
+/// Labels with what is shown of them.
+type Legend = Vec<(String, Sample)>;
 
 /// Where the parts of a panel go.
 struct Layout {
@@ -213,6 +210,8 @@ struct Layout {
     rows: i32,
     /// Label, middle and row from the bottom of those rows.
     labels: Vec<(String, i32, i32)>,
+    /// The panel's own legend, above its caption.
+    legend: Legend,
     height: i32,
 }
 
@@ -239,12 +238,18 @@ impl Layout {
         } else {
             TICKS_AND_NAME
         };
+        let legend = if chart.legend().is_empty() {
+            panel.legend()
+        } else {
+            Vec::new()
+        };
         Self {
-            height: CAPTION * rows + plot_height + below,
+            height: legend_height(&legend) + CAPTION * rows + plot_height + below,
             x,
             y,
             rows,
             labels,
+            legend,
         }
     }
 }
@@ -286,6 +291,21 @@ impl Panel {
         })
     }
 
+    fn legend(&self) -> Legend {
+        let mut legend: Legend = Vec::new();
+        for (series, line) in self.styled() {
+            let known = legend.iter().any(|(label, _)| *label == series.label);
+            if !series.label.is_empty() && !known {
+                let sample = match series.look {
+                    Look::Line(_) => Sample::Line(line),
+                    Look::Dots => Sample::Dot(line),
+                };
+                legend.push((series.label.clone(), sample));
+            }
+        }
+        legend
+    }
+
     /// Labels of regions and instants, each in the lowest row in which it does not meet another.
     fn labels(&self, x: &Axis) -> Vec<(String, i32, i32)> {
         let (left, right) = (BESIDE, WIDTH - RIGHT);
@@ -320,6 +340,8 @@ impl Panel {
     }
 
     fn draw(&self, area: &Area, layout: &Layout) {
+        draw_legend(area, &layout.legend, 0);
+        let (_, area) = area.split_below(legend_height(&layout.legend));
         let row_middle = |row: i32| CAPTION * row + CAPTION / 2;
         let style = TextStyle::new(TEXT_FONT, INK);
         let caption = shortened(&self.caption, WIDTH - BESIDE - RIGHT);
@@ -504,6 +526,24 @@ mod tests {
         );
         let gap = [(1.0, 0.1), (2.0, 0.1), (f64::NAN, 0.1), (3.0, 0.1)];
         assert_eq!(visible_pieces(&x, &y, &gap).len(), 2);
+    }
+
+    #[test]
+    fn panels_with_different_legends_have_their_own() {
+        let panel = |label: &str| Panel {
+            series: vec![series(label, Look::Line(0), vec![(0.0, 0.0), (1.0, 1.0)])],
+            ..Panel::default()
+        };
+        let with = |labels: [&str; 2]| {
+            let panels = labels.map(panel).into();
+            let heading = String::new();
+            Chart { heading, panels }
+        };
+        assert_eq!(with(["a", "a"]).legend().len(), 1);
+        assert_eq!(with(["a", ""]).legend().len(), 1);
+        let chart = with(["a", "b"]);
+        assert!(chart.legend().is_empty());
+        assert!(chart.svg().contains(">a</text>") && chart.svg().contains(">b</text>"));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::style::{BAND, CHARACTER_WIDTH, HEADING_FONT, INK, TEXT_FONT, WIDTH, t
 use crate::text::wrap;
 
 /// What a legend shows of an entry.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sample {
     /// A piece of line.
     Line(Line),
@@ -32,11 +32,9 @@ pub fn figure(
     let usable = WIDTH - 2 * MARGIN;
     let characters = f64::from(usable) / (f64::from(HEADING_FONT) * CHARACTER_WIDTH);
     let heading_lines = wrap(heading, characters as usize);
-    let places = legend_places(legend, usable);
-    let rows = places.last().map_or(0, |(_, row)| row + 1);
     let legend_top = MARGIN + HEADING_STEP * heading_lines.len() as i32;
-    let top = legend_top + LEGEND_STEP * rows + MARGIN / 2;
-    let size = (WIDTH, top + height);
+    let top = legend_top + legend_height(legend) + MARGIN / 2;
+    let size = (WIDTH, top + height + MARGIN / 2);
 
     let canvas = Canvas::default();
     let whole = canvas.area(size.0, size.1);
@@ -48,12 +46,24 @@ pub fn figure(
         let middle = MARGIN + HEADING_STEP * n as i32 + HEADING_STEP / 2;
         whole.text(line, (MARGIN, middle), style);
     }
-    for ((label, sample), (x, row)) in legend.iter().zip(places) {
-        let place = (MARGIN + x, legend_top + LEGEND_STEP * row + LEGEND_STEP / 2);
-        legend_entry(&whole, label, *sample, place);
-    }
+    draw_legend(&whole, legend, legend_top);
     paint(&whole.split_below(top).1);
     canvas.document(size, heading)
+}
+
+/// Height of a legend across a figure.
+pub(crate) fn legend_height(legend: &[(String, Sample)]) -> i32 {
+    let places = legend_places(legend, WIDTH - 2 * MARGIN);
+    LEGEND_STEP * places.last().map_or(0, |(_, row)| row + 1)
+}
+
+/// Draws a legend across a figure from a height down.
+pub(crate) fn draw_legend(area: &Area, legend: &[(String, Sample)], top: i32) {
+    let places = legend_places(legend, WIDTH - 2 * MARGIN);
+    for ((label, sample), (x, row)) in legend.iter().zip(places) {
+        let place = (MARGIN + x, top + LEGEND_STEP * row + LEGEND_STEP / 2);
+        legend_entry(area, label, *sample, place);
+    }
 }
 
 /// Offset and row of each legend entry.
@@ -101,7 +111,7 @@ mod tests {
 
     #[test]
     fn a_long_legend_takes_several_rows() {
-        let entry = |_| ("w".repeat(40), Sample::Band);
+        let entry = |_| ("n".repeat(40), Sample::Band);
         let legend: Vec<_> = (0..5).map(entry).collect();
         let places = legend_places(&legend, 1576);
         assert_eq!(places.last().unwrap().1, 2);

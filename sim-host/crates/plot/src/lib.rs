@@ -7,6 +7,7 @@ pub mod chart;
 pub mod colour_scale;
 pub mod figure;
 pub mod junit;
+pub mod matrix;
 pub mod number;
 pub mod page;
 pub mod raster;

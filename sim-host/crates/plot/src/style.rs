@@ -11,7 +11,7 @@ pub const TICK_FONT: u32 = 24;
 pub const TEXT_FONT: u32 = 25;
 /// Height of a heading.
 pub const HEADING_FONT: u32 = 30;
-/// Width of a character over the font's height, not less than common sans-serif fonts need.
+/// Greatest mean width of a character over the font's height in a bold text.
 pub(crate) const CHARACTER_WIDTH: f64 = 0.6;
 
 /// Colour of text and axes.
@@ -61,9 +61,22 @@ pub const DOTS: [Line; 4] = [
     line(Colour(0x7b, 0x50, 0xb6), 3, ""),
 ];
 
-/// Width of a text of the given height, rather too great than too small.
+/// Width of a text of the given height in a wide sans-serif font (DejaVu Sans); others are narrower.
 pub fn text_width(text: &str, height: u32) -> i32 {
-    (text.chars().count() as f64 * f64::from(height) * CHARACTER_WIDTH).ceil() as i32
+    let width: f64 = text.chars().map(character_width).sum();
+    (width * f64::from(height)).ceil() as i32
+}
+
+/// Width of a character over the font's height.
+fn character_width(character: char) -> f64 {
+    match character {
+        'i' | 'j' | 'l' | '\'' | '|' | 'I' => 0.3,
+        ' ' | '.' | ',' | ':' | ';' | 'f' | 't' | 'r' | '(' | ')' | '[' | ']' | '/' => 0.41,
+        'm' | 'w' | 'M' | 'W' | '%' | '@' | '\u{2026}' => 1.0,
+        '+' | '<' | '=' | '>' | '\u{2212}' | '\u{b1}' => 0.84,
+        'A'..='Z' => 0.79,
+        _ => 0.64,
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Distance of the f32 and f64 runs against time.
 
-use crate::report::RunReport;
+use crate::report::input::RunReport;
 use plot::axes::{Axes, stack, stack_height};
 use plot::axis::Axis;
 use plot::canvas::{Area, Line};
@@ -65,7 +65,7 @@ pub fn draw(runs: &[RunReport]) -> String {
         let y = Axis::decades(
             "relative distance",
             distances.flat_map(|distance| [distance / ROOM, distance * ROOM]),
-            10,
+            6,
         );
         let end_s = end_s(runs, values().map(|p| p.0).fold(0.0, f64::max));
         let rows = stack(area, groups.len(), PANEL, "time (s)");

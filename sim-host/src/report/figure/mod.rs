@@ -7,7 +7,7 @@ mod phase_portrait;
 mod pwm_trace;
 mod time_response;
 
-use super::ReportInput;
+use crate::report::input::ReportInput;
 
 /// A figure of the report.
 #[derive(Debug, Clone)]
@@ -72,7 +72,10 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
     let runs = input.runs.iter();
     let runs = runs.map(|run| (run.title.as_str(), &run.instructions));
     let drives = input.drives.iter();
-    let drives = drives.map(|driven| (driven.title.as_str(), &driven.instructions));
+    let drives = drives.map(|driven| {
+        let title = driven.title.trim_end_matches(" as scheduled");
+        (title, &driven.instructions)
+    });
     let rows: Vec<_> = runs.chain(drives).collect();
     figures.push(Figure {
         name: "instructions".into(),
@@ -88,7 +91,8 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
                 "{}. The vehicle on the host, the ECU on the emulated target, one exchange a PWM period.",
                 driven.title
             ),
-            svg: pil::figure::draw(&driven.title, &driven.run),
+            // The heading names the loop itself.
+            svg: pil::figure::draw(driven.title.trim_start_matches("in the loop, "), &driven.run),
         });
     }
     figures
@@ -97,11 +101,12 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Pair, sample};
+    use crate::report::input::{Pair, RunReport};
+    use crate::report::sample;
     use nalgebra::Vector4;
 
     /// All figures of one run paired with itself.
-    fn figures_of(run: crate::report::RunReport) -> Vec<Figure> {
+    fn figures_of(run: RunReport) -> Vec<Figure> {
         let verdict = sample::verdict();
         let pairs = [Pair {
             title: "with itself".into(),

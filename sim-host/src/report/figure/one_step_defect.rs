@@ -1,6 +1,6 @@
 //! The one-step defect over its bound against time.
 
-use crate::report::RunReport;
+use crate::report::input::RunReport;
 use plot::axes::{Axes, stack, stack_height};
 use plot::axis::Axis;
 use plot::figure::{Sample, figure};

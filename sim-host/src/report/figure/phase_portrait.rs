@@ -1,6 +1,6 @@
 //! Yaw rate against sideslip angle, without dither and with it.
 
-use crate::report::RunReport;
+use crate::report::input::RunReport;
 use dynamics::trace::Trace;
 use plot::axes::{Axes, CAPTION, TICKS_AND_NAME};
 use plot::axis::Axis;

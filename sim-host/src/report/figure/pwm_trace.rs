@@ -1,6 +1,6 @@
 //! The PWM's voltage around the dither's start.
 
-use crate::report::RunReport;
+use crate::report::input::RunReport;
 use plot::axes::{Axes, stack, stack_height};
 use plot::axis::Axis;
 use plot::canvas::Area;

@@ -1,6 +1,6 @@
 //! Sideslip angle and yaw rate against time, with and without dither.
 
-use crate::report::RunReport;
+use crate::report::input::RunReport;
 use dynamics::trace::Trace;
 use plot::axes::{Axes, stack, stack_height};
 use plot::axis::Axis;

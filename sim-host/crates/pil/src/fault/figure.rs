@@ -113,7 +113,9 @@ fn names(area: &Area, kinds: &[&str], manoeuvres: &[&str], width: i32) {
 
 /// A manoeuvre's name in lines that are no wider than its column.
 fn head(manoeuvre: &str, width: i32) -> Vec<String> {
-    wrap(manoeuvre, (width / text_width("m", HEAD_FONT)) as usize)
+    let letters = "abcdefghijklmnopqrstuvwxyz";
+    let fitting = width * letters.len() as i32 / text_width(letters, HEAD_FONT);
+    wrap(manoeuvre, fitting as usize)
 }
 
 /// The shares of the verdicts side by side, and the worst latency on the first.
