@@ -10,13 +10,13 @@ use dynamics::words::{counted, counted_as};
 use files::input;
 use files::output::{self, write_json, write_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
-use pil::drive::ecu_scenario;
+use pil::comparison::{Comparison, Depth, compare};
 use pil::figure::draw;
-use pil::levels::{Levels, Target, drive};
 use pil::manoeuvre::{self, Manoeuvre};
+use pil::mil_sil_pil::{MilSilPil, Target, run_all};
 use pil::profile::Profile;
 use pil::recording::{MAGIC, Recording};
-use pil::run::{Comparison, Depth, compare};
+use pil::vehicle_node::ecu_scenario;
 use qemu::Machine;
 use qemu::session::LinkKind;
 use shared_model::Scenario;
@@ -97,19 +97,19 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         time_out,
     };
     keep_to_one_core();
-    let mut driven = Vec::new();
+    let mut summaries = Vec::new();
     for (scenario, manoeuvre) in &manoeuvres {
-        let levels =
+        let runs =
             with_progress(scenario, manoeuvre, &target).with_context(|| manoeuvre.name.clone())?;
-        arguments.write(scenario, manoeuvre, &levels)?;
+        arguments.write(scenario, manoeuvre, &runs)?;
         // All that is kept of a run that may be long.
-        driven.push(Summary::of(&levels));
+        summaries.push(Summary::of(&runs));
     }
     if let Some(path) = &arguments.files.json {
-        write_json(path, &driven, arguments.files.force)?;
+        write_json(path, &summaries, arguments.files.force)?;
     }
-    show(&driven, arguments.link);
-    Ok(if driven.iter().all(|summary| summary.agree) {
+    show(&summaries, arguments.link);
+    Ok(if summaries.iter().all(|summary| summary.agree) {
         Outcome::Success
     } else {
         Outcome::Failed
@@ -177,9 +177,9 @@ impl Arguments {
         &self,
         scenario: &Scenario<f64>,
         manoeuvre: &Manoeuvre,
-        levels: &Levels,
+        runs: &MilSilPil,
     ) -> anyhow::Result<()> {
-        let run = &levels.processor.run;
+        let run = &runs.processor.run;
         if let Some(path) = &self.record {
             let recording = Recording {
                 scenario: ecu_scenario(scenario, manoeuvre),
@@ -191,7 +191,7 @@ impl Arguments {
             write_rows(path, &run.records, self.files.force)?;
         }
         if let Some(path) = &self.files.figure {
-            write_text(path, &draw(&levels.name, run), self.files.force)?;
+            write_text(path, &draw(&runs.name, run), self.files.force)?;
         }
         Ok(())
     }
@@ -201,7 +201,7 @@ fn with_progress(
     scenario: &Scenario<f64>,
     manoeuvre: &Manoeuvre,
     target: &Target,
-) -> anyhow::Result<Levels> {
+) -> anyhow::Result<MilSilPil> {
     /// PWM periods between two looks at the clock.
     const REPORTED: u64 = 1000;
     let rate_hz = scenario.run.pwm_rate_hz;
@@ -212,14 +212,14 @@ fn with_progress(
     );
     bar.set_message(manoeuvre.name.clone());
     let mut periods = 0;
-    let levels = drive(scenario, manoeuvre, target, || {
+    let runs = run_all(scenario, manoeuvre, target, || {
         periods += 1;
         if periods % REPORTED == 0 {
             bar.set_position(periods);
         }
     });
     bar.finish_and_clear();
-    Ok(levels?)
+    Ok(runs?)
 }
 
 /// What is said of a manoeuvre.
@@ -237,22 +237,22 @@ struct Summary {
 }
 
 impl Summary {
-    fn of(levels: &Levels) -> Self {
+    fn of(runs: &MilSilPil) -> Self {
         Self {
-            manoeuvre: levels.name.clone(),
-            simulated_s: levels.simulated_s,
-            model_software: levels.model_software,
-            software_processor: levels.software_processor,
-            double_precision_different_duties: levels.double_precision.different_duties,
-            double_precision_worst_counts: levels.double_precision.worst_counts,
-            agree: levels.agree(),
-            times_real_time: levels.speed(),
-            firmware: levels.processor.log.last().cloned().unwrap_or_default(),
+            manoeuvre: runs.name.clone(),
+            simulated_s: runs.simulated_s,
+            model_software: runs.model_software,
+            software_processor: runs.software_processor,
+            double_precision_different_duties: runs.double_precision.different_duties,
+            double_precision_worst_counts: runs.double_precision.worst_counts,
+            agree: runs.agree(),
+            times_real_time: runs.speed(),
+            firmware: runs.processor.log.last().cloned().unwrap_or_default(),
         }
     }
 }
 
-fn show(driven: &[Summary], link: LinkKind) {
+fn show(summaries: &[Summary], link: LinkKind) {
     say!(
         "{:38} {:>7} {:>9} {:>15} {:>15} {:>15} {:>7}",
         "manoeuvre",
@@ -263,7 +263,7 @@ fn show(driven: &[Summary], link: LinkKind) {
         "f64 would be",
         "speed"
     );
-    for summary in driven {
+    for summary in summaries {
         let other = summary.double_precision_different_duties;
         let double = match other {
             0 => "the same".into(),
@@ -280,7 +280,7 @@ fn show(driven: &[Summary], link: LinkKind) {
             summary.times_real_time
         );
     }
-    if let [only] = driven {
+    if let [only] = summaries {
         say!("firmware: {}", only.firmware);
     }
     say!(
