@@ -23,14 +23,14 @@ use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use std::path::{Path, PathBuf};
 
-/// Drive manoeuvres with the ECU in the loop: as a model, as software on this host, and as firmware in QEMU; compare the three
-/// period by period.
+/// Run manoeuvres with the ECU in the loop as a model (MIL), as software on this host (SIL) and as firmware in QEMU (PIL), and compare
+/// the three in each PWM period.
 ///
-/// The vehicle moves on the host in f64; once a PWM period the ECU puts out its duty and the vehicle answers. The same run always
-/// gives the same bytes.
+/// The vehicle is simulated on the host in f64. Once per PWM period the ECU sends its duty and the vehicle answers. Repeated runs are
+/// byte-identical.
 #[derive(clap::Args)]
 #[command(
-    mut_arg("out", |arg| arg.help("Write the vehicle's motion as CSV, one row a control tick")),
+    mut_arg("out", |arg| arg.help("Write the vehicle's trajectory as CSV, one row per control tick")),
     mut_arg("json", |arg| arg.help("Write the comparisons as JSON")),
     mut_arg("figure", |arg| arg.help("Draw the manoeuvre as an SVG figure"))
 )]
@@ -39,7 +39,7 @@ use std::path::{Path, PathBuf};
   sim-host pil --rpm 1880 --dither sine --figure pil.svg
   sim-host pil --scenario examples/manoeuvres/speed-ramp.toml \\
       --record ramp.loop --out ramp.csv
-  sim-host pil --replay ramp.loop       # the same again without QEMU
+  sim-host pil --replay ramp.loop       # the recorded run, without QEMU
   sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
   sim-host pil --link uart --time 1     # the board's UART: realistic, slow")]
 pub struct Arguments {
@@ -55,7 +55,7 @@ pub struct Arguments {
     /// Length instead of the manoeuvre's, s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time: Option<f64>,
-    /// What carries the exchange with the firmware
+    /// Link to the firmware
     #[arg(long, value_parser = link_kinds(), default_value = "files")]
     link: LinkKind,
     /// Machine to emulate
@@ -68,7 +68,7 @@ pub struct Arguments {
         default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
     )]
     firmware: PathBuf,
-    /// Record all that passes between the firmware and the vehicle
+    /// Record the exchange between firmware and vehicle
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay a recorded run without QEMU, and compare
@@ -76,7 +76,7 @@ pub struct Arguments {
     replay: Option<PathBuf>,
     #[command(flatten)]
     files: Destinations,
-    /// Longest time that the firmware may take for one answer, s
+    /// Time limit for one answer of the firmware, s
     #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
     time_out: f64,
 }
@@ -102,7 +102,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         let runs =
             with_progress(scenario, manoeuvre, &target).with_context(|| manoeuvre.name.clone())?;
         arguments.write(scenario, manoeuvre, &runs)?;
-        // All that is kept of a run that may be long.
+        // Only the summary is stored, because a run may be long.
         summaries.push(Summary::of(&runs));
     }
     if let Some(path) = &arguments.files.json {
@@ -116,12 +116,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Host and emulator take turns: on one core a turn costs a switch, on two a wake-up, which can take several times as long.
+/// Host and emulator alternate. On one core this costs a context switch; on two it costs a wake-up, which can take several times
+/// as long.
 fn keep_to_one_core() {
     use rustix::thread::{CpuSet, sched_getcpu, sched_setaffinity};
     let mut core = CpuSet::new();
     core.set(sched_getcpu());
-    // Where it is not allowed, the run only takes longer.
+    // Without permission, the run only takes longer.
     let _ = sched_setaffinity(None, &core);
 }
 
@@ -156,14 +157,14 @@ impl Arguments {
         Ok(())
     }
 
-    /// Refuses what cannot be written, before any work is done for it.
+    /// Rejects invalid outputs before the work begins.
     fn check_outputs(&self, manoeuvres: usize) -> anyhow::Result<()> {
         let [out, json, figure] = self.files.files();
         let of_one = [named("--record", &self.record), out, figure];
         for (option, _) in of_one.into_iter().flatten() {
             ensure!(
                 manoeuvres == 1,
-                "{option}: takes one manoeuvre, and there are {manoeuvres}; give one --scenario"
+                "{option} with {manoeuvres} manoeuvres: must be one manoeuvre; give one --scenario"
             );
         }
         let scenarios = self.scenario.iter();
@@ -202,7 +203,7 @@ fn with_progress(
     manoeuvre: &Manoeuvre,
     target: &Target,
 ) -> anyhow::Result<MilSilPil> {
-    /// PWM periods between two looks at the clock.
+    /// PWM periods between two updates of the progress.
     const REPORTED: u64 = 1000;
     let rate_hz = scenario.run.pwm_rate_hz;
     let bar = ProgressBar::new((scenario.run.duration_s * rate_hz) as u64).with_style(
@@ -222,7 +223,7 @@ fn with_progress(
     Ok(runs?)
 }
 
-/// What is said of a manoeuvre.
+/// The summary of a manoeuvre.
 #[derive(serde::Serialize)]
 struct Summary {
     manoeuvre: String,
@@ -258,15 +259,15 @@ fn show(summaries: &[Summary], link: LinkKind) {
         "manoeuvre",
         "s",
         "duties",
-        "model=software",
-        "software=PIL",
-        "f64 would be",
+        "MIL = SIL",
+        "SIL = PIL",
+        "f64",
         "speed"
     );
     for summary in summaries {
         let other = summary.double_precision_different_duties;
         let double = match other {
-            0 => "the same".into(),
+            0 => "equal".into(),
             _ => format!("{other}, <= {}", summary.double_precision_worst_counts),
         };
         say!(
@@ -284,17 +285,17 @@ fn show(summaries: &[Summary], link: LinkKind) {
         say!("firmware: {}", only.firmware);
     }
     say!(
-        "duties and actuator frames, bit for bit; `f64 would be`: duty codes of an ECU in f64 that differ, and by how many counts"
+        "duties and actuator frames are compared bit for bit; `f64`: duty codes of an ECU in f64 that differ, and the greatest difference in counts"
     );
     say!(
-        "not compared: costs and times (the emulator counts instructions), the log, and the vehicle, which is the same code at \
-         every level; the model level has no frame checks, so no warnings"
+        "not compared: costs and times (the emulator counts instructions), the log, and the vehicle, which is the same code in all \
+         three; MIL has no frame checks and therefore no warnings"
     );
     say!(
         "PIL: {}",
         match link {
             LinkKind::Files =>
-                "over pipes; the host is the clock, each control tick takes its nominal time",
+                "over pipes; the host is the clock, and each control tick takes its nominal time",
             LinkKind::Timed => "over pipes; the board's timers are the clock",
             LinkKind::Uart => "over the board's UART, framed; the host is the clock",
         }

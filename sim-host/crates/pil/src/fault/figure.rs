@@ -54,8 +54,7 @@ const FAILURE: Colour = Colour(0xc0, 0x10, 0x10);
 pub fn draw(rows: &[Row]) -> String {
     let kinds = distinct(rows.iter().map(|row| row.kind));
     let manoeuvres = distinct(rows.iter().map(|row| row.manoeuvre.as_str()));
-    let heading =
-        "Faults by manoeuvre: shares of the verdicts; number: worst latency, control ticks (1 ms)";
+    let heading = "Verdicts by fault and manoeuvre; number: worst latency, ticks of 1 ms";
     let height = TOP + CELL_HEIGHT * kinds.len() as i32 + RIGHT;
     let mut legend: Vec<_> = SHADES
         .iter()
