@@ -1,12 +1,13 @@
 //! The firmware in the loop: the same commands as the program on the host, over every link and on every board that the
 //! emulator has, twice the same bytes, and a clear end where the firmware is dead.
 
-use pil::drive::{Drive, ecu_scenario};
+use pil::closed_loop::run;
+use pil::comparison::{Depth, compare};
 use pil::ecu::Software;
-use pil::levels::{Levels, ProcessorRun, Target, drive, on_processor};
 use pil::manoeuvre::{Manoeuvre, load};
+use pil::mil_sil_pil::{MilSilPil, ProcessorRun, Target, on_processor, run_all};
 use pil::recording::Recording;
-use pil::run::{Depth, compare, run};
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use qemu::session::{LinkKind, Session};
 use qemu::{Machine, RunError};
 use shared_model::Scenario;
@@ -37,34 +38,34 @@ fn target(machine: Machine, link: LinkKind) -> Target {
     }
 }
 
-fn levels(file: &str, duration_s: f64, machine: Machine, link: LinkKind) -> Levels {
+fn run_in_loop(file: &str, duration_s: f64, machine: Machine, link: LinkKind) -> MilSilPil {
     let (mut scenario, manoeuvre) = manoeuvre(file, duration_s);
     scenario.servo.timer_clock_hz = machine.timer_clock_hz();
     let target = target(machine, link);
-    drive(&scenario, &manoeuvre, &target, || {}).unwrap_or_else(|error| panic!("{file}: {error}"))
+    run_all(&scenario, &manoeuvre, &target, || {}).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
 fn on_target(link: LinkKind) -> ProcessorRun {
     let (scenario, manoeuvre) = manoeuvre("low-resolution-noise.toml", 1.0);
-    let drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
+    let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
     let ecu = ecu_scenario(&scenario, &manoeuvre);
     let target = target(Machine::Mps2An386, link);
-    on_processor(&ecu, drive, &target, || {}).unwrap_or_else(|error| panic!("{error}"))
+    on_processor(&ecu, vehicle, &target, || {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn assert_agree(levels: &Levels) {
-    let name = &levels.name;
+fn assert_agree(runs: &MilSilPil) {
+    let name = &runs.name;
     assert!(
-        levels.model_software.is_equal(),
+        runs.model_software.is_equal(),
         "{name}: {:?}",
-        levels.model_software
+        runs.model_software
     );
     assert!(
-        levels.software_processor.is_equal(),
+        runs.software_processor.is_equal(),
         "{name}: {:?}",
-        levels.software_processor
+        runs.software_processor
     );
-    let last = levels
+    let last = runs
         .processor
         .run
         .actuations
@@ -91,10 +92,10 @@ fn every_manoeuvre_gives_the_same_commands_at_every_level() {
             continue;
         }
         let duration_s = if file == "speed-ramp.toml" { 12.0 } else { 5.0 };
-        let levels = levels(&file, duration_s, Machine::Mps2An386, LinkKind::Files);
-        assert_agree(&levels);
-        assert!(levels.software_processor.duties as f64 >= duration_s * 1e4);
-        assert!(levels.software_processor.frames as f64 >= duration_s * 1e3 - 1.0);
+        let runs = run_in_loop(&file, duration_s, Machine::Mps2An386, LinkKind::Files);
+        assert_agree(&runs);
+        assert!(runs.software_processor.duties as f64 >= duration_s * 1e4);
+        assert!(runs.software_processor.frames as f64 >= duration_s * 1e3 - 1.0);
         files += 1;
     }
     assert!(files >= 8, "{files} manoeuvres");
@@ -108,7 +109,7 @@ fn every_link_and_board_gives_the_same_commands() {
         (Machine::Mps2An500, LinkKind::Files),
         (Machine::NetduinoPlus2, LinkKind::Files),
     ] {
-        assert_agree(&levels(file, 4.0, machine, link));
+        assert_agree(&run_in_loop(file, 4.0, machine, link));
     }
 }
 
@@ -122,8 +123,8 @@ fn the_uart_carries_the_same_commands() {
     // A small request, so that the lead-in is short.
     let manoeuvre = Manoeuvre::constant(1750.0, 0.1);
     let target = target(Machine::Mps2An386, LinkKind::Uart);
-    let levels = drive(&scenario, &manoeuvre, &target, || {}).expect("it can be driven");
-    assert_agree(&levels);
+    let runs = run_all(&scenario, &manoeuvre, &target, || {}).expect("it can be driven");
+    assert_agree(&runs);
 }
 
 #[test]
@@ -152,8 +153,8 @@ fn two_runs_and_a_replay_give_the_same_bytes() {
 fn one_changed_bit_of_a_command_is_seen() {
     let (scenario, manoeuvre) = manoeuvre("constant-speed.toml", 0.2);
     let mut ecu = Software::new(&ecu_scenario(&scenario, &manoeuvre)).expect("it is valid");
-    let drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
-    let exchanges = run(&mut ecu, drive, || {})
+    let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
+    let exchanges = run(&mut ecu, vehicle, || {})
         .expect("it runs on the host")
         .exchanges;
     let with_frame = exchanges

@@ -1,12 +1,13 @@
-//! Faults of the ECU's processor, done to the firmware through the emulator's gdb stub; and faults between vehicle and
-//! ECU, which the firmware takes as the host's program does, bit for bit.
+//! Faults of the ECU's processor, injected into the firmware through the emulator's gdb stub; and faults between vehicle and
+//! ECU, to which firmware and host react bit-identically.
 
-use pil::fault::campaign::Row;
 use pil::fault::catalogue::{self, Kind};
-use pil::fault::judge::{Finder, Reaction, Verdict};
-use pil::fault::memory::{Region, flips};
-use pil::fault::processor::{Action, BENCH_TICKS, Bench};
-use pil::levels::Target;
+use pil::fault::judge::{Detector, Reaction, Verdict};
+use pil::fault::memory::flips;
+use pil::fault::processor::{BENCH_TICKS, Bench};
+use pil::fault::processor_fault::{Action, Region};
+use pil::fault::row::Row;
+use pil::mil_sil_pil::Target;
 use qemu::Machine;
 use qemu::session::LinkKind;
 use shared_model::frame::decode_actuation;
@@ -31,25 +32,25 @@ fn bench() -> Bench {
     Bench::short(&target()).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The stops alone change nothing, so that what else is different is the fault's doing.
+/// The debugger's stops alone change nothing, so any other difference is caused by the fault.
 #[test]
 fn stops_change_nothing() {
     let bench = bench();
     let run = bench.run(Action::Nothing, TICK).expect("it runs");
-    assert_eq!(run.packets, bench.clean());
-    assert_eq!(run.outcome.verdict, Verdict::Harmless);
+    assert_eq!(run.packets, bench.fault_free());
+    assert_eq!(run.outcome.verdict, Verdict::NoEffect);
 }
 
 #[test]
-fn what_is_done_to_the_core_is_found() {
+fn faults_of_the_core_are_detected() {
     let bench = bench();
-    let ended = |code| (Reaction::Ended, Some(Finder::Firmware(code)));
-    for (action, (reaction, finder), latest) in [
+    let ended = |code| (Reaction::Ended, Some(Detector::Firmware(code)));
+    for (action, (reaction, detector), latest) in [
         (Action::MissPwm(3), (Reaction::SafeState, None), 1),
         (Action::MissControl, (Reaction::SafeState, None), 2),
         (Action::DoubleControl, (Reaction::Tolerated, None), 1),
         (Action::Overrun, (Reaction::SafeState, None), 2),
-        // The watchdog has 20 ms.
+        // The watchdog expires after 20 ms.
         (Action::HangMainLoop, ended(15), 21),
         (Action::OverflowStack, ended(14), 1),
         (Action::HardFault, ended(14), 1),
@@ -57,10 +58,10 @@ fn what_is_done_to_the_core_is_found() {
     ] {
         let outcome = bench.run(action, TICK).expect("it runs").outcome;
         assert_eq!(outcome.reaction, reaction, "{action}: {outcome:?}");
-        let finding = outcome.finding.expect("it was found");
-        assert!(finding.latency_ticks <= latest, "{action}: {finding:?}");
-        if let Some(finder) = finder {
-            assert_eq!(finding.finder, finder, "{action}");
+        let detection = outcome.detection.expect("it was detected");
+        assert!(detection.latency_ticks <= latest, "{action}: {detection:?}");
+        if let Some(detector) = detector {
+            assert_eq!(detection.detector, detector, "{action}");
         }
     }
 }
@@ -69,27 +70,27 @@ fn what_is_done_to_the_core_is_found() {
 #[test]
 fn faults_are_repeatable() {
     let bench = bench();
-    let flip = flips(&target().image, FLIPS, TICK, 10)[0];
+    let flip = flips(&target().image, FLIPS, TICK..TICK + 10)[0];
     let [a, b] = [(), ()].map(|()| bench.run(flip.action, flip.tick).expect("it runs"));
     assert_eq!(a, b);
-    assert_ne!(a.packets, bench.clean());
+    assert_ne!(a.packets, bench.fault_free());
 }
 
 #[test]
-fn no_flipped_bit_is_silent() {
+fn no_flipped_bit_is_undetected() {
     let bench = bench();
-    let flips = flips(&target().image, FLIPS, TICK, BENCH_TICKS.len() as u32);
+    let flips = flips(&target().image, FLIPS, BENCH_TICKS);
     assert_eq!(flips.len(), FLIPS * Region::ALL.len());
     let rows: Vec<Row> = flips
         .iter()
         .map(|flip| {
             bench
-                .flip(flip)
+                .inject(*flip)
                 .unwrap_or_else(|error| panic!("{flip:?}: {error}"))
         })
         .collect();
-    let unlisted: Vec<&Row> = rows.iter().filter(|row| row.is_unlisted()).collect();
-    assert!(unlisted.is_empty(), "{unlisted:#?}");
+    let failures: Vec<&Row> = rows.iter().filter(|row| row.is_failure()).collect();
+    assert!(failures.is_empty(), "{failures:#?}");
     // The control task is compared as a whole at its next tick.
     let in_control = rows
         .iter()
@@ -98,19 +99,19 @@ fn no_flipped_bit_is_silent() {
     assert!(found.count() >= FLIPS - 1);
 }
 
-/// After a reset the ECU begins anew, on the processor as on the host: neutral, its counters from zero.
+/// After a reset the ECU starts from its initial state: neutral, its counters from zero.
 #[test]
-fn a_reset_begins_anew() {
+fn a_reset_restarts_from_the_initial_state() {
     let bench = bench();
     let packets = bench.run(Action::Reset, TICK).expect("it runs").packets;
     let from = (10 * TICK) as usize;
-    assert_eq!(packets[..from], bench.clean()[..from]);
+    assert_eq!(packets[..from], bench.fault_free()[..from]);
     let since = &packets[from..];
     // Neutral at least for the two ticks that the first command takes.
     assert!(
         since[..20]
             .iter()
-            .all(|packet| packet.duty_code == bench.clean()[0].duty_code)
+            .all(|packet| packet.duty_code == bench.fault_free()[0].duty_code)
     );
     let first = since.iter().find_map(|packet| packet.frame);
     let first = first.expect("a frame comes");
@@ -122,7 +123,7 @@ fn a_reset_begins_anew() {
 
 /// One fault of each kind between vehicle and ECU.
 #[test]
-fn the_firmware_takes_faults_as_the_host_does() {
+fn firmware_and_host_react_identically() {
     let bench = bench();
     let mut seen = BTreeSet::new();
     for fault in catalogue::all() {
@@ -133,7 +134,7 @@ fn the_firmware_takes_faults_as_the_host_does() {
             .both(fault, TICK)
             .unwrap_or_else(|error| panic!("{fault}: {error}"));
         assert_eq!(software, processor, "{fault}");
-        assert_eq!(software.len(), bench.clean().len());
+        assert_eq!(software.len(), bench.fault_free().len());
     }
     assert!(seen.len() > 20, "{seen:?}");
 }

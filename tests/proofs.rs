@@ -3,10 +3,10 @@
 use image::Image;
 use image::memory::Map;
 use image::stack::Stack;
-use pil::drive::{Drive, ecu_scenario};
 use pil::instructions::{Instructions, median, most};
-use pil::levels::{Target, on_processor};
 use pil::manoeuvre::{self, Manoeuvre};
+use pil::mil_sil_pil::{Target, on_processor};
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use qemu::Machine;
 use qemu::session::LinkKind;
 use shared_model::dither::{Application, Waveform};
@@ -212,9 +212,9 @@ fn drive() -> Instructions {
         link: LinkKind::Files,
         time_out: TIME_OUT,
     };
-    let drive = Drive::new(&scenario, &manoeuvre).expect("the example is valid");
+    let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("the example is valid");
     let ecu = ecu_scenario(&scenario, &manoeuvre);
-    let run = on_processor(&ecu, drive, &target, || {}).unwrap_or_else(|error| panic!("{error}"));
+    let run = on_processor(&ecu, vehicle, &target, || {}).unwrap_or_else(|error| panic!("{error}"));
     Instructions::in_loop(&run.costs, &scenario, target.machine)
 }
 

@@ -1,12 +1,13 @@
 //! Data from the firmware: telemetry, and the exchange in the loop.
 
 use crate::target::Target;
-use pil::drive::{Drive, ecu_scenario};
+use pil::closed_loop::run;
+use pil::comparison::{Depth, compare};
 use pil::ecu::Software;
 use pil::equivalence::trace_of;
 use pil::manoeuvre::Manoeuvre;
 use pil::recording::{MAGIC, Recording};
-use pil::run::{Depth, compare, run};
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use qemu::telemetry;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
@@ -155,9 +156,9 @@ fn recording_seeds() -> Vec<Vec<u8>> {
     scenario.dither.waveform = Waveform::Sine;
     let manoeuvre = Manoeuvre::constant(1750.0, 0.1);
     let ecu = ecu_scenario(&scenario, &manoeuvre);
-    let drive = Drive::new(&scenario, &manoeuvre).expect("it can be driven");
+    let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it can be driven");
     let software = &mut Software::new(&ecu).expect("the scenario is valid");
-    let mut driven = run(software, drive, || {}).expect("it is driven");
+    let mut driven = run(software, vehicle, || {}).expect("it is driven");
     driven.exchanges.truncate(60);
     let recording = Recording {
         scenario: ecu,

@@ -2,9 +2,9 @@
 
 use crate::target::{Target, as_it_is};
 use dynamics::config;
-use pil::drive::{Drive, ecu_scenario};
 use pil::ecu::Software;
 use pil::manoeuvre;
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use shared_model::Scenario;
 use sim_host::reproduce::Product;
 
@@ -93,10 +93,10 @@ fn read_manoeuvre(bytes: &[u8]) {
     match manoeuvre::from_text(text) {
         Ok((scenario, manoeuvre)) => {
             let software = Software::new(&ecu_scenario(&scenario, &manoeuvre));
-            let drive = Drive::new(&scenario, &manoeuvre);
-            if let (Ok(_), Ok(mut drive)) = (software, drive) {
-                assert!(drive.total_periods() > 0);
-                drive.answer(&shared_model::exchange::Packet {
+            let vehicle = VehicleNode::new(&scenario, &manoeuvre);
+            if let (Ok(_), Ok(mut vehicle)) = (software, vehicle) {
+                assert!(vehicle.total_periods() > 0);
+                vehicle.answer(&shared_model::exchange::Packet {
                     duty_code: 0,
                     frame: None,
                 });

@@ -56,7 +56,7 @@ fn bad_input_is_refused() {
                 "--points",
                 "1",
             ],
-            &["--points 1", "both ends the same"],
+            &["--points 1", "one point needs equal ends"],
         ),
         (
             &["reproduce", "--config", "missing.toml"],

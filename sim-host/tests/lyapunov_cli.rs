@@ -96,7 +96,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
     });
     assert!(files[0] == files[1] && files[0] == files[2]);
     let speeds = column(&folder.path().join("1.csv"), "wheel_speed_rpm");
-    // Four of the spectrum, twin, synchronisation.
+    // Four of the spectrum, two-particle method, synchronisation.
     let expected = ["1600.0", "1620.0", "1640.0"].map(|rpm| [rpm; 6]).concat();
     assert_eq!(speeds, expected);
     assert!(!files[0].iter().any(|file| file.contains("NaN")));
@@ -189,9 +189,9 @@ fn stopping_keeps_what_is_done() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(
         message.contains("16634 speeds"),
-        "the cost is said first: {message}"
+        "the estimated cost comes first: {message}"
     );
-    assert!(message.contains("stopped after"), "{message}");
+    assert!(message.contains("interrupted after"), "{message}");
     assert!(message.contains("of 16634 points"), "{message}");
     let rows = column(&folder.path().join("x.csv"), "exponent_per_s").len();
     assert!((1..16634).contains(&rows), "{rows} rows");

@@ -3,11 +3,11 @@
 mod common;
 
 use common::{assert_ends, command, folder};
-use pil::drive::{Drive, ecu_scenario};
+use pil::closed_loop::run;
 use pil::ecu::Software;
 use pil::manoeuvre::Manoeuvre;
 use pil::recording::Recording;
-use pil::run::run;
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use shared_model::Scenario;
 use std::path::Path;
 
@@ -59,11 +59,13 @@ fn recording() -> Vec<u8> {
     scenario.run.duration_s = 0.05;
     let manoeuvre = Manoeuvre::constant(1750.0, 0.1);
     let own = ecu_scenario(&scenario, &manoeuvre);
-    let drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
+    let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
     let mut ecu = Software::new(&own).expect("it is valid");
     let recording = Recording {
         scenario: own,
-        exchanges: run(&mut ecu, drive, || {}).expect("on the host").exchanges,
+        exchanges: run(&mut ecu, vehicle, || {})
+            .expect("on the host")
+            .exchanges,
     };
     let mut bytes = Vec::new();
     recording.write(&mut bytes).expect("a buffer takes it");

@@ -1,4 +1,4 @@
-//! `sim-host averaging`: the true dither signal against the averaged system.
+//! `sim-host averaging`: comparison of the system under the true dither signal with the averaged system.
 
 use super::options::RunOptions;
 use super::outcome::Outcome;
@@ -8,9 +8,9 @@ use dynamics::averaging::{Comparison, chart, compare};
 use dynamics::words::Short;
 use shared_model::dither::Waveform;
 
-/// The true dither signal against the averaged system, over the dither's frequency: where averaging starts to hold.
+/// Compare the system under the true dither signal with the averaged system, as a function of the dither frequency.
 ///
-/// Each motion runs 20 s of transient and 40 s that are compared, behind 200 s without dither.
+/// Each trajectory starts after a 200 s transient without dither. After a further transient of 20 s, 40 s are compared.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host averaging --dither square --amplitude-v 0.1
@@ -19,20 +19,20 @@ use shared_model::dither::Waveform;
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
-    /// One end of the frequencies, rad/s
+    /// First frequency, rad/s
     #[arg(long, value_name = "RAD_PER_S", default_value_t = 200.0)]
     from: f64,
-    /// Other end, rad/s
+    /// Last frequency, rad/s
     #[arg(long, value_name = "RAD_PER_S", default_value_t = 20_000.0)]
     to: f64,
-    /// Number of frequencies, evenly spaced in their logarithm
+    /// Number of frequencies, evenly spaced on a logarithmic scale
     #[arg(long, value_name = "NUMBER", default_value_t = 13)]
     points: u32,
     #[command(flatten)]
     destinations: Destinations,
 }
 
-/// Slower dither is no faster than the motion; faster needs a PWM rate that no timer has.
+/// Slower dither is not faster than the steering motion; faster dither needs a PWM rate that no timer has.
 const FREQUENCIES_RAD_PER_S: std::ops::RangeInclusive<f64> = 50.0..=100_000.0;
 const POINTS: std::ops::RangeInclusive<u32> = 1..=200;
 
@@ -49,7 +49,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     );
     ensure!(
         (points == 1) == (from == to),
-        "--points {points} --from {} --to {}: one frequency has both ends the same, and more have not",
+        "--points {points} --from {} --to {}: one point needs equal ends, and more points need different ends",
         Short(from),
         Short(to)
     );
@@ -62,7 +62,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     ensure!(
         scenario.dither.waveform != Waveform::None && scenario.dither.amplitude_v > 0.0,
-        "there is no dither to average: give --dither square or sine, and --amplitude-v"
+        "the scenario has no dither to average: give --dither square or --dither sine, and --amplitude-v greater than 0"
     );
     arguments.destinations.check(arguments.run.config.input())?;
     let frequencies = frequencies(from.min(to), from.max(to), points);
@@ -74,13 +74,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Frequencies that are evenly spaced in their logarithm, both ends among them.
+/// Frequencies evenly spaced on a logarithmic scale, including both ends.
 fn frequencies(least: f64, greatest: f64, points: u32) -> Vec<f64> {
     let ratio = (greatest / least).ln() / f64::from(points.max(2) - 1);
     let mut all: Vec<f64> = (0..points)
         .map(|k| least * (ratio * f64::from(k)).exp())
         .collect();
-    // Rounding has moved the last.
+    // Rounding may have moved the last value.
     all[points as usize - 1] = greatest;
     all
 }

@@ -1,4 +1,4 @@
-//! `sim-host basin`: which start ends on which attractor.
+//! `sim-host basin`: basins of attraction.
 
 use super::options::RunOptions;
 use super::outcome::Outcome;
@@ -9,9 +9,10 @@ use dynamics::sweep::{Timing, Values};
 use dynamics::words::counted;
 use serde::Serialize;
 
-/// Basins of attraction: which start ends on which attractor, over a grid of sideslip and steering angles.
+/// Compute basins of attraction over a grid of initial sideslip and steering angles.
 ///
-/// Yaw rate and steering rate start as in the scenario. Starts whose motion diverges are named as such.
+/// The initial yaw rate and steering rate are those of the scenario. Initial states whose trajectory diverges are reported as
+/// diverging.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host basin --rpm 1750 --out basin.csv --figure basin.svg
@@ -20,10 +21,10 @@ use serde::Serialize;
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
-    /// One end of the sideslip angles at the start, from which the steps count, rad
+    /// First initial sideslip angle, at which the steps begin, rad
     #[arg(long, value_name = "RAD", default_value_t = -0.3, allow_negative_numbers = true)]
     beta_from: f64,
-    /// Other end of the sideslip angles, rad
+    /// Last initial sideslip angle, rad
     #[arg(
         long,
         value_name = "RAD",
@@ -39,10 +40,10 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     beta_step: f64,
-    /// One end of the steering angles at the start, from which the steps count, rad
+    /// First initial steering angle, at which the steps begin, rad
     #[arg(long, value_name = "RAD", default_value_t = -0.6, allow_negative_numbers = true)]
     delta_from: f64,
-    /// Other end of the steering angles, rad
+    /// Last initial steering angle, rad
     #[arg(
         long,
         value_name = "RAD",
@@ -64,7 +65,7 @@ pub struct Arguments {
     destinations: Destinations,
 }
 
-/// Length of a run behind the transient unless `--time` says otherwise, s.
+/// Default length of a run after the transient, s.
 const OBSERVED_S: f64 = 200.0;
 
 #[derive(Serialize)]
@@ -117,7 +118,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         say!(
             "attractor {k}: {} ({})",
             attractor.describe(),
-            counted(cells, "start")
+            counted(cells, "initial state")
         );
     }
     check_interrupted(basin.cells.len(), runs)?;

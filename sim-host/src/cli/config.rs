@@ -4,12 +4,12 @@ use super::options::ConfigOptions;
 use super::outcome::Outcome;
 use dynamics::config::{to_commented_toml, validate};
 
-/// Print a complete configuration as TOML, checked. Names carry their units; comments show the allowed values.
+/// Print a complete, validated configuration as TOML. Names include units; comments give the allowed values.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host config > vehicle.toml        # the paper's vehicle, to be edited
+  sim-host config > vehicle.toml        # the paper's vehicle, to edit
   sim-host config --preset printed      # the equations as printed
-  sim-host config --config vehicle.toml # check a file and print it completed")]
+  sim-host config --config vehicle.toml # validate a file and complete it")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,

@@ -1,4 +1,4 @@
-//! `sim-host convergence`: the fixed step against the reference integrator.
+//! `sim-host convergence`: error of the fixed step relative to the reference integrator.
 
 use super::options::RunOptions;
 use super::outcome::Outcome;
@@ -7,10 +7,10 @@ use anyhow::ensure;
 use dynamics::convergence::{chart, errors};
 use dynamics::words::Short;
 
-/// Error of the ECU's fixed step against the reference integrator, over the length of the step.
+/// Compute the error of the ECU's fixed step relative to the reference integrator, as a function of the step.
 ///
-/// From the scenario's start, its dither on from time 0. The reference finds friction events to 1e-12 s. In chaos every error
-/// grows: compare over a few seconds.
+/// Both start from the scenario's initial state, with the dither on from time 0. The reference locates friction events to
+/// 1e-12 s. In chaos every error grows exponentially, so the comparison is meaningful for a few seconds only.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host convergence                  # over 4 s, friction events included
@@ -22,7 +22,7 @@ pub struct Arguments {
     destinations: Destinations,
 }
 
-/// Length of the motion unless `--time` says otherwise, s; and the most after which an error still says anything.
+/// Default length of the trajectory, s; and the allowed lengths, after which an error is still meaningful.
 const TIME_S: f64 = 4.0;
 const TIMES_S: std::ops::RangeInclusive<f64> = 0.01..=60.0;
 

@@ -11,7 +11,7 @@ pub fn machines() -> impl TypedValueParser<Value = Machine> {
     parser(Machine::ALL, |machine| (machine.name(), machine.core()))
 }
 
-/// The kinds of link by name.
+/// The links by name.
 pub fn link_kinds() -> impl TypedValueParser<Value = LinkKind> {
     parser(LinkKind::ALL, |kind| (kind.name(), kind.description()))
 }
@@ -35,5 +35,5 @@ fn parser<T: Copy + Send + Sync + 'static, const N: usize>(
 /// Opens a firmware image.
 pub fn open_image(path: &Path) -> anyhow::Result<Image> {
     Image::open(path)
-        .map_err(|error| anyhow::anyhow!("{error}; `cargo xtask firmware` builds an image"))
+        .map_err(|error| anyhow::anyhow!("{error}; build the image with `cargo xtask firmware`"))
 }

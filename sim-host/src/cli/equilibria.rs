@@ -11,12 +11,11 @@ use dynamics::words::{counted, counted_as};
 use serde::Serialize;
 use shared_model::vehicle::STEERING_ANGLE;
 
-/// All equilibria at a wheel speed or over a range of speeds, with eigenvalues and stability, and the speeds of Hopf
+/// Compute all equilibria at a wheel speed or over a range of speeds, with eigenvalues and stability, and the speeds of Hopf
 /// bifurcations.
 ///
-/// With the mean of the dither. Coulomb friction holds the steering in a band around each equilibrium, which is reported with
-/// it; the eigenvalues are those of sliding motion beside the equilibrium, and, in the JSON, of the motion with the steering
-/// held.
+/// The dither is averaged. Coulomb friction holds the steering in a band around each equilibrium, which is reported with it. The
+/// eigenvalues are those of the slipping mode beside the equilibrium; the JSON also contains those of the sticking mode.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host equilibria --rpm 1750        # all of the paper's vehicle
@@ -31,8 +30,8 @@ pub struct Arguments {
     destinations: Destinations,
 }
 
-/// More speeds than this are refused: two such runs do the same.
-const MOST_SPEEDS: usize = 100_000;
+/// Maximum number of speeds; a longer range can be split into several runs.
+const MAX_SPEEDS: usize = 100_000;
 
 #[derive(Serialize)]
 struct Results {
@@ -92,12 +91,12 @@ impl Row {
 pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.run.scenario()?;
     if let Some(time_s) = arguments.run.time {
-        bail!("--time {time_s}: equilibria are solved for, not run to; leave it out");
+        bail!("--time {time_s}: has no effect, because equilibria are solved directly; omit it");
     }
     let values = arguments.range.values(&scenario)?;
     ensure!(
-        values.count() <= MOST_SPEEDS,
-        "{} speeds: must be at most {MOST_SPEEDS}",
+        values.count() <= MAX_SPEEDS,
+        "{} speeds: must be at most {MAX_SPEEDS}; increase --step",
         values.count()
     );
     arguments.destinations.check(arguments.run.config.input())?;

@@ -1,13 +1,13 @@
-//! What the subcommands share that look at the plane of wheel speed and dither amplitude: its axes, and the times of each run.
+//! Options of the plane of wheel speed and dither amplitude: its axes, and the times of each run.
 
 use clap::Args;
 use dynamics::sweep::{SweepError, Timing};
 use shared_model::dither::Waveform;
 
-/// The plane's axes; amplitudes begin at 0 unless they are given another beginning.
+/// The plane's axes; amplitudes begin at 0 by default.
 #[derive(Args)]
 pub struct GridOptions {
-    /// One end of the wheel speeds, from which the steps count, rpm
+    /// First wheel speed, at which the steps begin, rpm
     #[arg(
         long,
         value_name = "RPM",
@@ -15,7 +15,7 @@ pub struct GridOptions {
         allow_negative_numbers = true
     )]
     pub from: f64,
-    /// Other end of the wheel speeds, rpm
+    /// Last wheel speed, rpm
     #[arg(
         long,
         value_name = "RPM",
@@ -37,7 +37,7 @@ pub struct GridOptions {
     /// Step of the square wave's amplitude, V
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     pub square_step: Option<f64>,
-    /// Greatest amplitude of the sine, V
+    /// Greatest amplitude of the sine wave, V
     #[arg(
         long,
         value_name = "VOLTS",
@@ -45,13 +45,13 @@ pub struct GridOptions {
         allow_negative_numbers = true
     )]
     pub sine_to: f64,
-    /// Step of the sine's amplitude, V
+    /// Step of the sine wave's amplitude, V
     #[arg(long, value_name = "VOLTS", allow_negative_numbers = true)]
     pub sine_step: Option<f64>,
 }
 
 impl GridOptions {
-    /// What the waveform's amplitudes are called, the greatest and their step, V.
+    /// Name, greatest value (V) and step (V) of the waveform's amplitudes.
     pub fn amplitudes_v(&self, waveform: Waveform) -> (&'static str, f64, Option<f64>) {
         match waveform {
             Waveform::Sine => ("amplitude of the sine (V)", self.sine_to, self.sine_step),
@@ -67,7 +67,7 @@ impl GridOptions {
 /// The times of each run.
 #[derive(Args)]
 pub struct TimeOptions {
-    /// What of each run is not looked at, s
+    /// Initial transient of each run to discard, s
     #[arg(
         long,
         value_name = "SECONDS",
@@ -75,7 +75,7 @@ pub struct TimeOptions {
         allow_negative_numbers = true
     )]
     pub transient: f64,
-    /// Length of each run, s
+    /// Length of each run, including the transient, s
     #[arg(
         long,
         value_name = "SECONDS",
@@ -86,7 +86,7 @@ pub struct TimeOptions {
 }
 
 impl TimeOptions {
-    /// The times, checked.
+    /// The validated times.
     pub fn timing(&self) -> Result<Timing, SweepError> {
         Timing::new(self.transient, self.time)
     }

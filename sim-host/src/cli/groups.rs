@@ -1,4 +1,4 @@
-//! The subcommands in groups, for the help.
+//! Groups of the subcommands in the help.
 
 use clap::Command;
 use std::fmt::Write;
@@ -12,7 +12,7 @@ const GROUPS: [Group; 4] = [
         &[
             (
                 "verify",
-                "firmware in QEMU against the host: report and verdict",
+                "firmware in QEMU compared with the host: report and verdict",
             ),
             (
                 "pil",
@@ -58,7 +58,7 @@ const GROUPS: [Group; 4] = [
             ),
             (
                 "schedule",
-                "dither amplitude for each wheel speed, as the ECU's table",
+                "dither amplitude for each wheel speed: the ECU's table",
             ),
         ],
     ),
@@ -68,7 +68,7 @@ const GROUPS: [Group; 4] = [
             ("reproduce", "all figures and claims, as one page"),
             (
                 "averaging",
-                "frequency from which the dither may be averaged",
+                "lowest frequency at which the dither may be averaged",
             ),
             ("tires", "cornering force against slip angle (Figure 2)"),
             (
@@ -77,7 +77,7 @@ const GROUPS: [Group; 4] = [
             ),
             (
                 "realisability",
-                "torque and amplitude that a steering actuator can reach",
+                "torque and amplitude limits of a steering actuator",
             ),
         ],
     ),
@@ -90,7 +90,7 @@ const GROUPS: [Group; 4] = [
             ),
             (
                 "convergence",
-                "error of the fixed step against the reference",
+                "error of the fixed step relative to the reference",
             ),
         ],
     ),
@@ -103,7 +103,7 @@ const TEMPLATE: &str =
 pub fn show_in_groups(command: Command) -> Command {
     let mut list = String::new();
     for (heading, subcommands) in GROUPS {
-        // A string takes everything.
+        // Writing to a string cannot fail.
         let _ = writeln!(list, "{heading}:");
         for (name, summary) in subcommands {
             let _ = writeln!(list, "  {name:14} {summary}");

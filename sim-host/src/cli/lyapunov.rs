@@ -16,10 +16,11 @@ use serde::Serialize;
 use shared_model::Scenario;
 use std::time::{Duration, Instant};
 
-/// Lyapunov exponents of the motion, at one speed or over a range of speeds, by three independent methods.
+/// Estimate Lyapunov exponents at one speed or over a range of speeds, by three independent methods.
 ///
-/// Positive: chaos. The dither, if there is one, is averaged and on from the start. A motion that diverges and a search that finds
-/// nothing are named in the results. Ctrl-C stops behind the points in work and writes what is done.
+/// A positive largest exponent indicates chaos. The dither, if any, is averaged and on from the start. The results report
+/// trajectories that diverge and searches without a result. On Ctrl-C, points in progress are finished and the results so far are
+/// written.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host lyapunov --rpm 1750 --method all     # three methods side by side
@@ -33,13 +34,13 @@ pub struct Arguments {
     run: RunOptions,
     #[command(flatten)]
     range: SpeedRange,
-    /// How the largest exponent is measured
+    /// Method for the largest exponent
     #[arg(long, value_enum, default_value = "tangent")]
     method: Choice,
-    /// All four exponents by tangent dynamics, beside those of --method twin or synchronisation
+    /// Estimate all four exponents by tangent dynamics, in addition to --method two-particle or synchronisation
     #[arg(long)]
     spectrum: bool,
-    /// Part of the run that passes before the motion is measured, s; the run is 1200 s unless --time says otherwise
+    /// Initial transient to discard, s; the run is 1200 s including it, unless --time is given
     #[arg(
         long,
         value_name = "SECONDS",
@@ -47,13 +48,13 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     transient: f64,
-    /// Synchronisation: weakest coupling that is tried, 1/s
+    /// Synchronisation: weakest coupling of the search, 1/s
     #[arg(long, value_name = "PER_S", default_value_t = Search::default().from_per_s, allow_negative_numbers = true)]
     coupling_from: f64,
-    /// Synchronisation: strongest coupling that is tried, 1/s
+    /// Synchronisation: strongest coupling of the search, 1/s
     #[arg(long, value_name = "PER_S", default_value_t = Search::default().to_per_s, allow_negative_numbers = true)]
     coupling_to: f64,
-    /// Synchronisation: width at which the bisection ends, 1/s
+    /// Synchronisation: tolerance of the bisection, 1/s
     #[arg(long, value_name = "PER_S", default_value_t = Search::default().tolerance_per_s, allow_negative_numbers = true)]
     tolerance: f64,
     #[command(flatten)]
@@ -64,21 +65,22 @@ pub struct Arguments {
 enum Choice {
     /// Tangent dynamics
     Tangent,
-    /// Two neighbouring motions
-    Twin,
-    /// The least coupling that synchronises, the paper's method, equations (17) to (19)
+    /// Two-particle method: separation of two neighbouring trajectories
+    #[value(alias = "twin")]
+    TwoParticle,
+    /// Least coupling that synchronises two copies: the paper's method, equations (17) to (19)
     Synchronisation,
-    /// These three
+    /// All three
     All,
-    /// Equation (20) as printed: a conditional exponent, not the largest one
+    /// Equation (20) as printed: a conditional exponent, not the largest exponent
     PrintedResponse,
 }
 
-/// Length of the run unless `--time` says otherwise, s.
+/// Default length of the run, s.
 const TIME_S: f64 = 1200.0;
-/// Less than this behind the transient, some eighty cycles, has no standard error worth its name, s.
+/// Least length after the transient, about eighty cycles, for a meaningful standard error, s.
 const LEAST_OBSERVED_S: f64 = 100.0;
-/// Work that takes longer than this is announced, s.
+/// Estimated work above which the estimate is printed, s.
 const ANNOUNCED_S: f64 = 10.0;
 
 #[derive(Serialize)]
@@ -117,7 +119,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     })?;
     if done < points {
         eprintln!(
-            "stopped after {done} of {}; their results are shown, and written where files were asked for",
+            "interrupted after {done} of {}; the results so far are printed and written to the requested files",
             counted(points, "point")
         );
         return Ok(Outcome::Code(COULD_NOT_RUN));
@@ -125,7 +127,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// One scenario for each speed, checked.
+/// One validated scenario for each speed.
 fn speeds(arguments: &Arguments) -> anyhow::Result<Vec<Scenario<f64>>> {
     let scenario = arguments.run.scenario()?;
     let values = arguments.range.values(&scenario)?;
@@ -137,7 +139,7 @@ fn timing(arguments: &Arguments) -> anyhow::Result<Timing> {
     let timing = Timing::new(arguments.transient, time_s)?;
     ensure!(
         timing.observed_s >= LEAST_OBSERVED_S,
-        "--time {} with --transient {} leaves {} s to measure: must be at least {LEAST_OBSERVED_S} s",
+        "--time {} with --transient {} leaves {} s after the transient: must be at least {LEAST_OBSERVED_S} s",
         Short(time_s),
         Short(timing.transient_s),
         Short(timing.observed_s)
@@ -158,13 +160,13 @@ fn methods(arguments: &Arguments) -> Vec<Method> {
     match arguments.method {
         Choice::Tangent => vec![tangent],
         Choice::All => vec![tangent, Method::Twin, Method::Synchronisation],
-        Choice::Twin => alone(Method::Twin),
+        Choice::TwoParticle => alone(Method::Twin),
         Choice::Synchronisation => alone(Method::Synchronisation),
         Choice::PrintedResponse => alone(Method::PrintedResponse),
     }
 }
 
-/// Says what long work will cost, from the time that a few steps take here.
+/// Prints the estimated time of long work, from the measured time of some steps.
 fn announce(
     scenarios: &[Scenario<f64>],
     methods: &[Method],
@@ -185,7 +187,7 @@ fn announce(
     let seconds = one_speed * step * scenarios.len() as f64 / threads;
     if seconds > ANNOUNCED_S {
         eprintln!(
-            "{}, {} s each: about {seconds:.0} s of work on {}; Ctrl-C keeps what is done",
+            "{}, {} s each: about {seconds:.0} s on {}; Ctrl-C keeps the results so far",
             counted(scenarios.len(), "speed"),
             timing.time_s(),
             counted(threads, "thread")
@@ -194,7 +196,7 @@ fn announce(
     Ok(())
 }
 
-/// The estimates by speed and method, and how many points are done.
+/// The estimates by speed and method, and the number of completed points.
 fn measure(
     scenarios: &[Scenario<f64>],
     methods: &[Method],

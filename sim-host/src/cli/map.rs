@@ -1,4 +1,4 @@
-//! `sim-host map`: exponent, period and extent of the motion over wheel speed and dither amplitude.
+//! `sim-host map`: largest Lyapunov exponent, period, extent and regime over wheel speed and dither amplitude.
 
 use super::grid::{GridOptions, TimeOptions};
 use super::options::ConfigOptions;
@@ -19,12 +19,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::dither::Waveform;
 use std::path::PathBuf;
 
-/// The motion over wheel speed N and dither amplitude W: largest Lyapunov exponent, period, extent and kind in each cell.
+/// Compute a map over wheel speed N and dither amplitude W: largest Lyapunov exponent, period, extent and regime of each cell.
 ///
-/// The dither acts through its mean and from the start. Period and extent come from the turning points of what is behind the
-/// transient, the exponent from a tangent vector along it. Cells are made in tiles; each is kept in the work folder as soon as it is
-/// done. Ctrl-C ends after the present tiles, and the same command goes on from there. The files are the same to the byte whatever
-/// the threads, interruptions and shards.
+/// The dither is averaged and on from the start. Period and extent are computed from the turning points after the transient, the
+/// exponent from a tangent vector along the trajectory. Cells are computed in tiles, and each completed tile is stored in the work
+/// folder. On Ctrl-C, tiles in progress are finished, and the same command continues with the missing tiles. The files are
+/// byte-identical for any number of threads, interruptions and shards.
 #[derive(Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -33,7 +33,7 @@ use std::path::PathBuf;
       --out map.csv --parquet map.parquet --figure map.svg
   sim-host map --dither square --from 1700 --to 1800 --step 2 \\
       --square-to 0.1 --square-step 0.002 --figure map-detail.svg
-  # on two machines; then both together
+  # on two machines, then merged
   sim-host map --speeds 16 --amplitudes 16 --shard 1/2 --work one
   sim-host map --speeds 16 --amplitudes 16 --shard 2/2 --work two
   sim-host map merge one two --out map-merged.csv"
@@ -46,12 +46,12 @@ pub struct Arguments {
     /// Waveforms of the dither
     #[arg(long, value_enum, default_value_t = Dither::Both)]
     dither: Dither,
-    /// Starts: the scenario's, the one with the opposite signs, or both
+    /// Initial states: the scenario's, its mirror image (opposite signs), or both
     #[arg(long, value_enum, default_value_t = Starts::Given)]
     start: Starts,
     #[command(flatten)]
     grid: GridOptions,
-    /// Number of wheel speeds, both ends among them, instead of --step
+    /// Number of wheel speeds including both ends, instead of --step
     #[arg(
         long,
         value_name = "COUNT",
@@ -67,7 +67,7 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     square_from: f64,
-    /// Least amplitude of the sine, V
+    /// Least amplitude of the sine wave, V
     #[arg(
         long,
         value_name = "VOLTS",
@@ -75,15 +75,15 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     sine_from: f64,
-    /// Number of amplitudes of each waveform, both ends among them, instead of --square-step and --sine-step
+    /// Number of amplitudes of each waveform including both ends, instead of --square-step and --sine-step
     #[arg(long, value_name = "COUNT", default_value_t = 256, conflicts_with_all = ["square_step", "sine_step"])]
     amplitudes: usize,
     #[command(flatten)]
     times: TimeOptions,
-    /// Folder of the tiles [default: the first file's name with `.tiles` behind it]
+    /// Folder of the tiles [default: the first file's name followed by `.tiles`]
     #[arg(long, value_name = "DIR")]
     work: Option<PathBuf>,
-    /// Make only the I-th of N shares of the tiles, for `map merge`
+    /// Compute only shard I of N of the tiles, for `map merge`
     #[arg(long, value_name = "I/N", conflicts_with_all = ["out", "parquet", "figure"], requires = "work")]
     shard: Option<Shard>,
     #[command(flatten)]
@@ -95,7 +95,7 @@ enum Action {
     Merge(Merge),
 }
 
-/// Puts the tiles of several work folders together. The plan is theirs.
+/// Merge the tiles of several work folders, which must be of the same map.
 #[derive(Args)]
 struct Merge {
     /// The work folders
@@ -131,7 +131,7 @@ struct Files {
     /// Draw the map as an SVG figure
     #[arg(long, value_name = "FILE")]
     figure: Option<PathBuf>,
-    /// Overwrite files that exist
+    /// Overwrite existing files
     #[arg(long)]
     force: bool,
 }
@@ -150,7 +150,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let missing = folder.missing(shard).len();
     if missing > 0 {
         bail!(
-            "interrupted with {} still to be made; the same command goes on from those in {}",
+            "interrupted with {} missing; the same command continues from the tiles in {}",
             counted(missing, "tile"),
             work.display()
         );
@@ -163,13 +163,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     arguments.files.write(&plan, &cells)?;
     show(&plan, &cells);
     say!(
-        "tiles: {}, to be deleted when no longer needed",
+        "tiles: {}; delete this folder when it is no longer needed",
         work.display()
     );
     Ok(Outcome::Success)
 }
 
-/// Makes the missing tiles with progress on a terminal.
+/// Computes the missing tiles, with progress on a terminal.
 fn fill(folder: &Folder, shard: Shard) -> anyhow::Result<()> {
     let template = "{elapsed_precise} [{bar:40}] {pos}/{len} cells, {per_sec}, {eta} left";
     let style = ProgressStyle::with_template(template)
@@ -195,11 +195,12 @@ impl Arguments {
         let mut files = self.files.all().peekable();
         ensure!(
             files.peek().is_some(),
-            "nothing to make: give --out, --parquet, --figure or --work"
+            "no output: give --out, --parquet, --figure or --work"
         );
         let file = files.find(|(_, file)| output::is_file(file));
-        let (_, file) =
-            file.context("--work: no file gives the tiles' folder its name; give one")?;
+        let (_, file) = file.context(
+            "--work: is required without a regular output file, which gives the folder its name",
+        )?;
         let mut name = file.as_os_str().to_owned();
         name.push(".tiles");
         Ok(name.into())
@@ -248,7 +249,7 @@ impl Arguments {
     }
 }
 
-/// An axis in steps, or of so many values.
+/// An axis given by its step or by its number of values.
 fn grid(
     what: &'static str,
     from: f64,
@@ -267,7 +268,7 @@ impl Merge {
     fn run(&self) -> anyhow::Result<Outcome> {
         ensure!(
             self.files.all().next().is_some(),
-            "nothing to make: give --out, --parquet or --figure"
+            "no output: give --out, --parquet or --figure"
         );
         let folders = self.folders.iter();
         let folders = folders.map(|folder| ("the folder", folder.as_path()));
@@ -312,7 +313,7 @@ impl Files {
     }
 }
 
-/// How many cells are of which kind, sheet by sheet.
+/// Shares of the regimes, sheet by sheet.
 fn show(plan: &Plan, cells: &[Cell]) {
     for (sheet, cells) in plan
         .sheets
@@ -324,7 +325,7 @@ fn show(plan: &Plan, cells: &[Cell]) {
             100.0 * count as f64 / cells.len() as f64
         };
         say!(
-            "{:?} dither, {:?} start, {}: {:.1} % at rest, {:.1} % periodic, {:.1} % chaos, {:.1} % undecided, {:.1} % diverge",
+            "{:?} dither, {:?} initial state, {}: {:.1} % at rest, {:.1} % periodic, {:.1} % chaos, {:.1} % undecided, {:.1} % diverge",
             sheet.waveform,
             sheet.start,
             counted(cells.len(), "cell"),

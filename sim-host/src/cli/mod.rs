@@ -1,6 +1,6 @@
-//! One file a subcommand, and what they share: exit codes, configuration options, output files.
+//! Command line: one file per subcommand, and their shared options, outputs and exit codes.
 
-// First, for its macro.
+// First, because the other modules use its macro.
 #[macro_use]
 mod stdout;
 
@@ -41,12 +41,13 @@ use std::io::ErrorKind;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Time that an interrupted job has to write its results.
+/// Time limit for an interrupted job to write its results.
 const GRACE: Duration = Duration::from_millis(900);
 
-/// Host simulator of the steering ECU: compares it with the firmware in QEMU, and shows chaos and its suppression by dither.
+/// Simulate the steering ECU on the host, compare it with the firmware in QEMU, and analyse chaos and its suppression by dither.
 ///
-/// Exit codes: 0 verdict pass, 1 verdict fail, 2 could not run (missing tool, bad input, time-out). The last line says why.
+/// Exit codes: 0 verdict pass, 1 verdict fail, 2 could not run (missing tool, invalid input, time-out). The last line gives the
+/// reason.
 #[derive(Parser)]
 #[command(name = "sim-host", version, max_term_width = 110)]
 struct Cli {
@@ -98,7 +99,7 @@ pub fn main() -> ExitCode {
         Err(usage) => return show(&usage),
     };
     if let Err(error) = ctrlc::set_handler(end_soon) {
-        eprintln!("warning: Ctrl-C ends this program at once: {error}");
+        eprintln!("warning: Ctrl-C will end this program without writing results: {error}");
     }
     let done = interrupt::catch(|| run(command)).unwrap_or_else(|stopped| Err(stopped.into()));
     match done.and_then(|done| stdout::finish().map(|()| done)) {
@@ -107,15 +108,15 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Ctrl-C or SIGTERM: long jobs end in good order and write the results that are complete. A second one ends them at once, and so does
-/// the end of the grace period.
+/// On Ctrl-C or SIGTERM, long jobs finish their work in progress and write the results so far. A second signal ends them
+/// immediately, as does the end of the grace period.
 fn end_soon() {
     if interrupt::request() {
         std::process::exit(COULD_NOT_RUN.into());
     }
     std::thread::spawn(|| {
         std::thread::sleep(GRACE);
-        eprintln!("error: interrupted; what was not written by now is lost");
+        eprintln!("error: interrupted; unwritten results are lost");
         std::process::exit(COULD_NOT_RUN.into());
     });
 }
@@ -150,7 +151,7 @@ fn run(command: Command) -> anyhow::Result<Outcome> {
     }
 }
 
-/// Shows a help text, or what is wrong with the command line.
+/// Prints a help text or an error of the command line.
 fn show(usage: &clap::Error) -> ExitCode {
     let code = ExitCode::from(usage.exit_code() as u8);
     match usage.print() {

@@ -1,4 +1,4 @@
-//! `sim-host nonlinearity`: what dither makes of the nonlinearities.
+//! `sim-host nonlinearity`: effective nonlinearities under dither.
 
 use super::options::{ConfigOptions, waveform};
 use super::outcome::Outcome;
@@ -10,8 +10,8 @@ use dynamics::config::validate;
 use serde::Serialize;
 use shared_model::dither::Waveform;
 
-/// Effective against original nonlinearity (Figures 9 to 11 and 14 to 16): front tyre, rear tyre, and the friction's sign as
-/// printed.
+/// Compare effective and original nonlinearities (Figures 9 to 11 and 14 to 16): front tyre, rear tyre, and the sign function of the
+/// friction as printed.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host nonlinearity --dither square --amplitude-v 0.1 --figure figs9-11.svg
@@ -56,7 +56,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let amplitude_rad = scenario.dither.amplitude_rad();
     ensure!(
         amplitude_rad > 0.0,
-        "there is no dither: give --dither square or --dither sine, and --amplitude-v greater than 0"
+        "the scenario has no dither: give --dither square or --dither sine, and --amplitude-v greater than 0"
     );
     let greatest = greatest_angle("--max", arguments.max)?;
     arguments.destinations.check(arguments.config.input())?;

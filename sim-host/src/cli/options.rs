@@ -1,4 +1,4 @@
-//! Options that several subcommands share: the scenario's parameters, and time-outs.
+//! Options shared by several subcommands: the scenario's parameters, and time-outs.
 
 use super::output::{Named, named};
 use clap::Args;
@@ -11,13 +11,13 @@ use shared_model::settings::Choice;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Where a scenario's parameters come from.
+/// Source of a scenario's parameters.
 #[derive(Args)]
 pub struct ConfigOptions {
     /// Preset: `reconstruction` (the reading that reproduces the paper) or `printed` (the equations as printed)
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
-    /// TOML file over the preset; `sim-host config` prints a complete one
+    /// TOML file with parameters that replace the preset's; `sim-host config` prints a complete file
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
 }
@@ -31,12 +31,12 @@ impl ConfigOptions {
         }
     }
 
-    /// The file that is read, if any.
+    /// The input file, if any.
     pub fn input(&self) -> Option<Named<'_>> {
         named("--config", &self.config)
     }
 
-    /// As they are given on a command line, each with a blank before it.
+    /// The options of a command line, each with a leading space.
     pub fn words(&self) -> String {
         let preset = self.preset.iter().map(|name| format!(" --preset {name}"));
         let config = self.config.iter();
@@ -45,12 +45,12 @@ impl ConfigOptions {
     }
 }
 
-/// The scenario of a file. It is said in which parameters it differs from the paper's, and if the file holds none.
+/// The scenario of a file. Reports the parameters that differ from the paper's, and a file without parameters.
 pub fn load_file(file: &Path, preset: Option<&str>) -> Result<Scenario<f64>, ConfigError> {
     let over = read(file)?;
     if sets_nothing(&over) {
         eprintln!(
-            "warning: {} sets no parameter, so all are the preset's; `sim-host config` prints a complete file",
+            "warning: {} sets no parameter; all values are from the preset. `sim-host config` prints a complete file",
             file.display()
         );
     }
@@ -67,14 +67,14 @@ pub fn load_file(file: &Path, preset: Option<&str>) -> Result<Scenario<f64>, Con
     Ok(scenario)
 }
 
-/// Whether a file holds nothing, or sections with nothing in them.
+/// Whether a file is empty or has only empty sections.
 pub fn sets_nothing(table: &toml::Table) -> bool {
     table
         .values()
         .all(|value| value.as_table().is_some_and(sets_nothing))
 }
 
-/// What to do about a motion that ends early.
+/// Advice for a trajectory that ends early.
 pub fn advice(reason: Reason) -> &'static str {
     match reason {
         Reason::Diverges => {
@@ -84,7 +84,7 @@ pub fn advice(reason: Reason) -> &'static str {
     }
 }
 
-/// Parameters of a run that are set most often.
+/// The most frequent parameters of a run.
 #[derive(Args)]
 pub struct RunOptions {
     #[command(flatten)]
@@ -104,7 +104,7 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    /// The scenario, checked.
+    /// The validated scenario.
     pub fn scenario(&self) -> Result<Scenario<f64>, ConfigError> {
         let mut scenario = self.config.load()?;
         let run = &mut scenario.run;

@@ -15,11 +15,11 @@ use dynamics::words::counted;
 use serde::Serialize;
 use shared_model::Scenario;
 
-/// Orbit diagram (bifurcation diagram): maxima of the yaw rate, or crossings of a section, over wheel speed or dither
-/// amplitude.
+/// Compute an orbit diagram (bifurcation diagram) over wheel speed or dither amplitude: maxima of the yaw rate, or crossings of a
+/// section.
 ///
-/// Each run starts as the scenario does, or where its neighbour ended (`--start up` or `down`), so hysteresis shows. The
-/// dither is averaged and on from the start. Ensemble that diverge are named as such and have no values.
+/// Each run starts from the scenario's initial state, or from the final state of its neighbour (`--start up` or `down`), which
+/// shows hysteresis. The dither is averaged and on from the start. Runs that diverge are reported as diverging and have no values.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host orbit --from 1600 --to 1900 --step 1 \\
@@ -37,11 +37,11 @@ pub struct Arguments {
     range: RangeOptions,
     #[command(flatten)]
     transient: TransientOptions,
-    /// From where each run starts
+    /// Initial state of each run
     #[arg(long, value_enum, default_value_t = StartOption::Fixed)]
     start: StartOption,
-    /// What is shown: the yaw rate's maxima, or the yaw rate (of the yaw rate the sideslip angle) where a component rises
-    /// through `--level`
+    /// Section: the maxima of the yaw rate, or rising crossings of `--level` by a component. A crossing shows the yaw rate, a
+    /// crossing of the yaw rate shows the sideslip angle
     #[arg(long, value_enum, default_value_t = SectionOption::YawRateMaxima)]
     section: SectionOption,
     /// Level of the section, rad or rad/s
@@ -58,11 +58,11 @@ pub struct Arguments {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum StartOption {
-    /// As the scenario does
+    /// The scenario's initial state
     Fixed,
-    /// Where the next lower value's run ended
+    /// The final state of the next lower value
     Up,
-    /// Where the next higher value's run ended
+    /// The final state of the next higher value
     Down,
 }
 
@@ -93,7 +93,7 @@ impl SectionOption {
     }
 }
 
-/// Length of a run behind the transient unless `--time` says otherwise, s.
+/// Default length of a run after the transient, s.
 const OBSERVED_S: f64 = 200.0;
 
 #[derive(Serialize)]
@@ -198,7 +198,7 @@ fn summary(results: &Results) -> String {
         _ => None,
     });
     format!(
-        "{} of {}: the section is met at {met}, missed at {misses}; {rests} at rest, {diverges} diverging{}",
+        "{} of {}: {met} with crossings, {misses} without; {rests} at rest, {diverges} diverging{}",
         counted(results.points.len(), "value"),
         results.parameter.name(),
         not_followed.unwrap_or_default()

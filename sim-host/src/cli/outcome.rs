@@ -1,18 +1,18 @@
-//! How a job ended, as exit code and last line.
+//! Outcome of a job: exit code and last line.
 
 use std::process::ExitCode;
 
 /// Exit code of a failed verdict.
 pub const FAILED: u8 = 1;
-/// Exit code where the job could not be done.
+/// Exit code of a job that could not run.
 pub const COULD_NOT_RUN: u8 = 2;
-/// The outcome of a job that could be done.
+/// The outcome of a completed job.
 pub enum Outcome {
     /// Success, or a verdict of pass.
     Success,
     /// A verdict of fail.
     Failed,
-    /// An exit code to pass on.
+    /// The exit code of another program.
     Code(u8),
 }
 
@@ -32,7 +32,7 @@ pub fn could_not_run(error: &anyhow::Error) -> ExitCode {
     ExitCode::from(COULD_NOT_RUN)
 }
 
-/// The error and its causes, each once: some messages contain their cause, others leave it to the chain.
+/// The error and its causes, each once. Some messages already contain their cause.
 fn message(error: &anyhow::Error) -> String {
     let mut message = String::new();
     for cause in error.chain().map(ToString::to_string) {

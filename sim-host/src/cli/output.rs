@@ -1,4 +1,4 @@
-//! What the subcommands share that write files: their options, and the checks before the work begins.
+//! Output files: options, and checks before the work begins.
 
 use super::stdout;
 use clap::Args;
@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 /// A file or folder, and the option that names it.
 pub type Named<'a> = (&'static str, &'a Path);
 
-/// The file of an option, if it was given.
+/// The file of an option, if given.
 pub fn named<'a>(option: &'static str, file: &'a Option<PathBuf>) -> Option<Named<'a>> {
     file.as_deref().map(|file| (option, file))
 }
 
-/// Checks the files that a job is to write, before its work begins; those that it reads must not be among them.
+/// Checks a job's output files before its work begins. An input file must not be among them.
 pub fn check<'a>(
     inputs: impl IntoIterator<Item = Named<'a>>,
     files: impl IntoIterator<Item = Option<Named<'a>>>,
@@ -33,25 +33,25 @@ pub fn check<'a>(
     Ok(outputs)
 }
 
-/// Where an analysis writes its results. Without any, a summary is all there is.
+/// Output files of an analysis. Without them, only a summary is printed.
 #[derive(Args)]
 pub struct Destinations {
-    /// Write the results as CSV; `-` is standard output, here and for all files
+    /// Write the results as CSV; `-` is standard output, for this and all other files
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// Write the results as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Draw them as an SVG figure
+    /// Draw the results as an SVG figure
     #[arg(long, value_name = "FILE")]
     pub figure: Option<PathBuf>,
-    /// Overwrite files that exist
+    /// Overwrite existing files
     #[arg(long)]
     pub force: bool,
 }
 
 impl Destinations {
-    /// The files that were asked for.
+    /// The requested files.
     pub fn files(&self) -> [Option<Named<'_>>; 3] {
         [
             named("--out", &self.out),
@@ -65,7 +65,7 @@ impl Destinations {
         check(inputs, self.files(), self.force).map(drop)
     }
 
-    /// Writes the rows as CSV, all results as JSON, and the figure: each if it was asked for.
+    /// Writes the rows as CSV, all results as JSON, and the figure: each if requested.
     pub fn write(
         &self,
         rows: impl IntoIterator<Item = impl Serialize>,

@@ -1,4 +1,4 @@
-//! `sim-host phase`: phase portrait of the settled motion.
+//! `sim-host phase`: phase portrait after the transient.
 
 use super::outcome::Outcome;
 use super::output::Destinations;
@@ -7,7 +7,7 @@ use dynamics::component::{Component, panel_of_states};
 use plot::chart::{Chart, Look};
 use serde::Serialize;
 
-/// Phase portrait of the settled motion: one component of the state against another.
+/// Draw a phase portrait after the transient: one component of the state against another.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host phase --rpm 1750 --figure phase.svg

@@ -10,27 +10,27 @@ use dynamics::words::{counted, counted_as};
 use files::input;
 use files::output::{self, write_json, write_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
-use pil::drive::ecu_scenario;
+use pil::comparison::{Comparison, Depth, compare};
 use pil::figure::draw;
-use pil::levels::{Levels, Target, drive};
 use pil::manoeuvre::{self, Manoeuvre};
+use pil::mil_sil_pil::{MilSilPil, Target, run_all};
 use pil::profile::Profile;
 use pil::recording::{MAGIC, Recording};
-use pil::run::{Comparison, Depth, compare};
+use pil::vehicle_node::ecu_scenario;
 use qemu::Machine;
 use qemu::session::LinkKind;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use std::path::{Path, PathBuf};
 
-/// Drive manoeuvres with the ECU in the loop: as a model, as software on this host, and as firmware in QEMU; compare the three
-/// period by period.
+/// Run manoeuvres with the ECU in the loop as a model (MIL), as software on this host (SIL) and as firmware in QEMU (PIL), and compare
+/// the three in each PWM period.
 ///
-/// The vehicle moves on the host in f64; once a PWM period the ECU puts out its duty and the vehicle answers. The same run always
-/// gives the same bytes.
+/// The vehicle is simulated on the host in f64. Once per PWM period the ECU sends its duty and the vehicle answers. Repeated runs are
+/// byte-identical.
 #[derive(clap::Args)]
 #[command(
-    mut_arg("out", |arg| arg.help("Write the vehicle's motion as CSV, one row a control tick")),
+    mut_arg("out", |arg| arg.help("Write the vehicle's trajectory as CSV, one row per control tick")),
     mut_arg("json", |arg| arg.help("Write the comparisons as JSON")),
     mut_arg("figure", |arg| arg.help("Draw the manoeuvre as an SVG figure"))
 )]
@@ -39,7 +39,7 @@ use std::path::{Path, PathBuf};
   sim-host pil --rpm 1880 --dither sine --figure pil.svg
   sim-host pil --scenario examples/manoeuvres/speed-ramp.toml \\
       --record ramp.loop --out ramp.csv
-  sim-host pil --replay ramp.loop       # the same again without QEMU
+  sim-host pil --replay ramp.loop       # the recorded run, without QEMU
   sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
   sim-host pil --link uart --time 1     # the board's UART: realistic, slow")]
 pub struct Arguments {
@@ -55,7 +55,7 @@ pub struct Arguments {
     /// Length instead of the manoeuvre's, s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time: Option<f64>,
-    /// What carries the exchange with the firmware
+    /// Link to the firmware
     #[arg(long, value_parser = link_kinds(), default_value = "files")]
     link: LinkKind,
     /// Machine to emulate
@@ -68,7 +68,7 @@ pub struct Arguments {
         default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
     )]
     firmware: PathBuf,
-    /// Record all that passes between the firmware and the vehicle
+    /// Record the exchange between firmware and vehicle
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Replay a recorded run without QEMU, and compare
@@ -76,7 +76,7 @@ pub struct Arguments {
     replay: Option<PathBuf>,
     #[command(flatten)]
     files: Destinations,
-    /// Longest time that the firmware may take for one answer, s
+    /// Time limit for one answer of the firmware, s
     #[arg(long, value_name = "SECONDS", default_value_t = 20.0)]
     time_out: f64,
 }
@@ -97,31 +97,32 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         time_out,
     };
     keep_to_one_core();
-    let mut driven = Vec::new();
+    let mut summaries = Vec::new();
     for (scenario, manoeuvre) in &manoeuvres {
-        let levels =
+        let runs =
             with_progress(scenario, manoeuvre, &target).with_context(|| manoeuvre.name.clone())?;
-        arguments.write(scenario, manoeuvre, &levels)?;
-        // All that is kept of a run that may be long.
-        driven.push(Summary::of(&levels));
+        arguments.write(scenario, manoeuvre, &runs)?;
+        // Only the summary is stored, because a run may be long.
+        summaries.push(Summary::of(&runs));
     }
     if let Some(path) = &arguments.files.json {
-        write_json(path, &driven, arguments.files.force)?;
+        write_json(path, &summaries, arguments.files.force)?;
     }
-    show(&driven, arguments.link);
-    Ok(if driven.iter().all(|summary| summary.agree) {
+    show(&summaries, arguments.link);
+    Ok(if summaries.iter().all(|summary| summary.agree) {
         Outcome::Success
     } else {
         Outcome::Failed
     })
 }
 
-/// Host and emulator take turns: on one core a turn costs a switch, on two a wake-up, which can take several times as long.
+/// Host and emulator alternate. On one core this costs a context switch; on two it costs a wake-up, which can take several times
+/// as long.
 fn keep_to_one_core() {
     use rustix::thread::{CpuSet, sched_getcpu, sched_setaffinity};
     let mut core = CpuSet::new();
     core.set(sched_getcpu());
-    // Where it is not allowed, the run only takes longer.
+    // Without permission, the run only takes longer.
     let _ = sched_setaffinity(None, &core);
 }
 
@@ -156,14 +157,14 @@ impl Arguments {
         Ok(())
     }
 
-    /// Refuses what cannot be written, before any work is done for it.
+    /// Rejects invalid outputs before the work begins.
     fn check_outputs(&self, manoeuvres: usize) -> anyhow::Result<()> {
         let [out, json, figure] = self.files.files();
         let of_one = [named("--record", &self.record), out, figure];
         for (option, _) in of_one.into_iter().flatten() {
             ensure!(
                 manoeuvres == 1,
-                "{option}: takes one manoeuvre, and there are {manoeuvres}; give one --scenario"
+                "{option} with {manoeuvres} manoeuvres: must be one manoeuvre; give one --scenario"
             );
         }
         let scenarios = self.scenario.iter();
@@ -177,9 +178,9 @@ impl Arguments {
         &self,
         scenario: &Scenario<f64>,
         manoeuvre: &Manoeuvre,
-        levels: &Levels,
+        runs: &MilSilPil,
     ) -> anyhow::Result<()> {
-        let run = &levels.processor.run;
+        let run = &runs.processor.run;
         if let Some(path) = &self.record {
             let recording = Recording {
                 scenario: ecu_scenario(scenario, manoeuvre),
@@ -191,7 +192,7 @@ impl Arguments {
             write_rows(path, &run.records, self.files.force)?;
         }
         if let Some(path) = &self.files.figure {
-            write_text(path, &draw(&levels.name, run), self.files.force)?;
+            write_text(path, &draw(&runs.name, run), self.files.force)?;
         }
         Ok(())
     }
@@ -201,8 +202,8 @@ fn with_progress(
     scenario: &Scenario<f64>,
     manoeuvre: &Manoeuvre,
     target: &Target,
-) -> anyhow::Result<Levels> {
-    /// PWM periods between two looks at the clock.
+) -> anyhow::Result<MilSilPil> {
+    /// PWM periods between two updates of the progress.
     const REPORTED: u64 = 1000;
     let rate_hz = scenario.run.pwm_rate_hz;
     let bar = ProgressBar::new((scenario.run.duration_s * rate_hz) as u64).with_style(
@@ -212,17 +213,17 @@ fn with_progress(
     );
     bar.set_message(manoeuvre.name.clone());
     let mut periods = 0;
-    let levels = drive(scenario, manoeuvre, target, || {
+    let runs = run_all(scenario, manoeuvre, target, || {
         periods += 1;
         if periods % REPORTED == 0 {
             bar.set_position(periods);
         }
     });
     bar.finish_and_clear();
-    Ok(levels?)
+    Ok(runs?)
 }
 
-/// What is said of a manoeuvre.
+/// The summary of a manoeuvre.
 #[derive(serde::Serialize)]
 struct Summary {
     manoeuvre: String,
@@ -237,36 +238,36 @@ struct Summary {
 }
 
 impl Summary {
-    fn of(levels: &Levels) -> Self {
+    fn of(runs: &MilSilPil) -> Self {
         Self {
-            manoeuvre: levels.name.clone(),
-            simulated_s: levels.simulated_s,
-            model_software: levels.model_software,
-            software_processor: levels.software_processor,
-            double_precision_different_duties: levels.double_precision.different_duties,
-            double_precision_worst_counts: levels.double_precision.worst_counts,
-            agree: levels.agree(),
-            times_real_time: levels.speed(),
-            firmware: levels.processor.log.last().cloned().unwrap_or_default(),
+            manoeuvre: runs.name.clone(),
+            simulated_s: runs.simulated_s,
+            model_software: runs.model_software,
+            software_processor: runs.software_processor,
+            double_precision_different_duties: runs.double_precision.different_duties,
+            double_precision_worst_counts: runs.double_precision.worst_counts,
+            agree: runs.agree(),
+            times_real_time: runs.speed(),
+            firmware: runs.processor.log.last().cloned().unwrap_or_default(),
         }
     }
 }
 
-fn show(driven: &[Summary], link: LinkKind) {
+fn show(summaries: &[Summary], link: LinkKind) {
     say!(
         "{:38} {:>7} {:>9} {:>15} {:>15} {:>15} {:>7}",
         "manoeuvre",
         "s",
         "duties",
-        "model=software",
-        "software=PIL",
-        "f64 would be",
+        "MIL = SIL",
+        "SIL = PIL",
+        "f64",
         "speed"
     );
-    for summary in driven {
+    for summary in summaries {
         let other = summary.double_precision_different_duties;
         let double = match other {
-            0 => "the same".into(),
+            0 => "equal".into(),
             _ => format!("{other}, <= {}", summary.double_precision_worst_counts),
         };
         say!(
@@ -280,21 +281,21 @@ fn show(driven: &[Summary], link: LinkKind) {
             summary.times_real_time
         );
     }
-    if let [only] = driven {
+    if let [only] = summaries {
         say!("firmware: {}", only.firmware);
     }
     say!(
-        "duties and actuator frames, bit for bit; `f64 would be`: duty codes of an ECU in f64 that differ, and by how many counts"
+        "duties and actuator frames are compared bit for bit; `f64`: duty codes of an ECU in f64 that differ, and the greatest difference in counts"
     );
     say!(
-        "not compared: costs and times (the emulator counts instructions), the log, and the vehicle, which is the same code at \
-         every level; the model level has no frame checks, so no warnings"
+        "not compared: costs and times (the emulator counts instructions), the log, and the vehicle, which is the same code in all \
+         three; MIL has no frame checks and therefore no warnings"
     );
     say!(
         "PIL: {}",
         match link {
             LinkKind::Files =>
-                "over pipes; the host is the clock, each control tick takes its nominal time",
+                "over pipes; the host is the clock, and each control tick takes its nominal time",
             LinkKind::Timed => "over pipes; the board's timers are the clock",
             LinkKind::Uart => "over the board's UART, framed; the host is the clock",
         }

@@ -1,4 +1,4 @@
-//! `sim-host poincare`: Poincaré section of the settled motion.
+//! `sim-host poincare`: Poincaré section after the transient.
 
 use super::outcome::Outcome;
 use super::output::Destinations;
@@ -12,7 +12,7 @@ use dynamics::words::counted;
 use plot::chart::{Chart, Look, Panel};
 use serde::Serialize;
 
-/// Poincaré section of the settled motion: its states where one component passes a value.
+/// Compute a Poincaré section after the transient: the states at which one component crosses a value.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host poincare --rpm 1750 --time 2000 --figure poincare.svg
@@ -25,19 +25,19 @@ Components: sideslip (beta), yaw_rate (gamma), steering_angle (delta_f), steerin
 pub struct Arguments {
     #[command(flatten)]
     run: SettledRun,
-    /// Component that passes the section
+    /// Component that defines the section
     #[arg(long, value_name = "COMPONENT", default_value = "yaw_rate")]
     section: Component,
-    /// Its value on the section, in its unit; without, the middle of its range in the run
+    /// Its value on the section, in its unit [default: the middle of its range in the run]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     at: Option<f64>,
-    /// How it passes the value
+    /// Direction of the crossing
     #[arg(long, value_enum, default_value = "rising")]
     direction: Sense,
-    /// Component on the horizontal axis; without, the first that is not the section's
+    /// Component on the horizontal axis [default: the first that is not the section's]
     #[arg(long, value_name = "COMPONENT")]
     x: Option<Component>,
-    /// Component on the vertical axis; without, the next one
+    /// Component on the vertical axis [default: the next one]
     #[arg(long, value_name = "COMPONENT")]
     y: Option<Component>,
     #[command(flatten)]
@@ -128,10 +128,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Some(value) => value,
         None => {
             let (low, high) = range(&scenario, arguments.run.transient, component)
-                .context("nothing was written")?;
+                .context("no file was written")?;
             ensure!(
                 high - low > 1e-9,
-                "the motion is at rest: {component} ranges from {low} to {high} {}, so no section is crossed; nothing was written",
+                "the trajectory is at rest: {component} ranges from {low} to {high} {}, so it crosses no section; no file was written",
                 component.unit
             );
             0.5 * (low + high)
@@ -147,7 +147,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         },
     };
     let found =
-        crossings(&scenario, arguments.run.transient, &section).context("nothing was written")?;
+        crossings(&scenario, arguments.run.transient, &section).context("no file was written")?;
     let (first, last) = (found[0].time_s, found[found.len() - 1].time_s);
     let returns = found.len() - 1;
     let results = Results {
@@ -172,7 +172,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         })?;
     say!("{} of {section}", counted(found.len(), "crossing"));
     if let Some(time_s) = results.mean_return_time_s {
-        say!("mean time between them {time_s:.6} s");
+        say!("mean time between crossings {time_s:.6} s");
     }
     Ok(Outcome::Success)
 }

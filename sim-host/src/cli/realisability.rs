@@ -1,4 +1,4 @@
-//! `sim-host realisability`: what a steering actuator can produce of the dither.
+//! `sim-host realisability`: limits of a steering actuator for the dither.
 
 use super::options::ConfigOptions;
 use super::outcome::Outcome;
@@ -10,8 +10,8 @@ use dynamics::words::Short;
 use serde::Serialize;
 use shared_model::dither::Waveform;
 
-/// What the steering actuator passes of the dither (Bode diagram), the torque that the dither's amplitude would need, and the
-/// amplitude that the motor reaches, from 1 to 20,000 rad/s.
+/// Compute the frequency response of the steering actuator (Bode diagram), the torque for the dither's amplitude, and the amplitude
+/// at the motor's greatest torque, from 1 to 20,000 rad/s.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host realisability --figure bode.svg
@@ -30,7 +30,7 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     square_v: f64,
-    /// Amplitude of the sine, V
+    /// Amplitude of the sine wave, V
     #[arg(
         long,
         value_name = "VOLTS",

@@ -1,4 +1,4 @@
-//! `sim-host regions`: kinds of motion along a sweep, and the edges between them.
+//! `sim-host regions`: regimes along a sweep, and the edges between them.
 
 use super::options::RunOptions;
 use super::outcome::Outcome;
@@ -14,12 +14,12 @@ use dynamics::words::{Short, counted};
 use serde::Serialize;
 use shared_model::Scenario;
 
-/// Kinds of motion (equilibrium, period-n, chaos) over wheel speed or dither amplitude, with each edge between them bisected.
+/// Classify regimes (equilibrium, period-n, chaos) over wheel speed or dither amplitude, and bisect the edges between them.
 ///
-/// The period is that of the yaw rate's maxima; chaos is a largest Lyapunov exponent above three standard errors and above
-/// what the run can tell from zero. Where the two disagree the motion is undecided. Chaos whose maxima visit n separate
-/// bands in turn is told from chaos in one. From the scenario's start and from the mirrored one, on the other lobe of the
-/// steering angle; attractors that coexist are named.
+/// The period is that of the yaw rate's maxima. Chaos requires a largest Lyapunov exponent that exceeds three standard errors and
+/// the resolution of the run. If the two criteria disagree, the regime is undecided. Chaos whose maxima visit n separate bands in
+/// turn is distinguished from one-band chaos. The sweep is run from the scenario's initial state and from the mirrored one, on the
+/// other lobe of the steering angle. Coexisting attractors are reported.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host regions --from 1600 --to 1900 --step 5 \\
@@ -33,7 +33,7 @@ pub struct Arguments {
     run: RunOptions,
     #[command(flatten)]
     range: RangeOptions,
-    /// Width to which an edge is located [default: 0.5 rpm; 0.0005 V]
+    /// Tolerance of an edge [default: 0.5 rpm; 0.0005 V]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     width: Option<f64>,
     #[command(flatten)]
@@ -42,9 +42,9 @@ pub struct Arguments {
     destinations: Destinations,
 }
 
-/// Length of a run behind the transient unless `--time` says otherwise, s.
+/// Default length of a run after the transient, s.
 const OBSERVED_S: f64 = 400.0;
-/// Finer widths only resolve rounding.
+/// A smaller width only resolves rounding.
 const LEAST_WIDTH: f64 = 1e-9;
 
 #[derive(Serialize)]
@@ -53,7 +53,7 @@ struct Results {
     timing: Timing,
     width: f64,
     sweeps: Vec<Sweep>,
-    /// Values at which the two starts end on attractors that differ.
+    /// Values at which the two initial states lead to different attractors.
     coexisting_at: Vec<f64>,
 }
 
@@ -157,7 +157,7 @@ fn row<'a>(
 fn show(results: &Results) {
     let unit = results.parameter.unit();
     for sweep in &results.sweeps {
-        say!("from the {} start:", sweep.start);
+        say!("from the {} initial state:", sweep.start);
         for region in &sweep.found.regions {
             let inside = |s: &&Sample| (region.from..=region.to).contains(&s.value);
             let mut lobes: Vec<_> = sweep.found.samples.iter().filter(inside).collect();
@@ -187,6 +187,6 @@ fn show(results: &Results) {
             "two attractors coexist at {} from {first} to {last} {unit}",
             counted(at.len(), "value")
         ),
-        _ => say!("both starts end on the same attractor at every value"),
+        _ => say!("both initial states lead to the same attractor at every value"),
     }
 }

@@ -9,10 +9,10 @@ use sim_host::reproduce::{CLAIMS, Judgement, Options, Progress, Quality, Summary
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Reproduce the paper: draw its figures, judge its claims under both presets, show what the print gets wrong, and write one page.
+/// Reproduce the paper: draw its figures, check its claims under both presets, list its errata, and write one page.
 ///
-/// What is done is kept: after Ctrl-C the same command goes on where it stopped. With another vehicle's file, that vehicle is
-/// judged instead of the presets.
+/// Completed parts are stored. After Ctrl-C, the same command continues with the missing parts. With the file of another vehicle,
+/// the claims are checked for that vehicle instead of the presets.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host reproduce --quick    # everything in seconds
@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
   sim-host config > vehicle.toml
   sim-host reproduce --config vehicle.toml --out target/vehicle")]
 pub struct Arguments {
-    /// Coarse sweeps and short runs
+    /// Use coarse sweeps and short runs
     #[arg(long)]
     quick: bool,
     /// TOML file of another vehicle, instead of both presets
@@ -29,7 +29,7 @@ pub struct Arguments {
     /// Folder for page, figures and data
     #[arg(long, value_name = "FOLDER", default_value = "target/reproduction")]
     out: PathBuf,
-    /// Write into a folder that holds other files than a reproduction's
+    /// Write into a folder that contains other files
     #[arg(long)]
     force: bool,
 }
@@ -63,7 +63,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
                 done,
             } => {
                 let note = if kept {
-                    ": kept".into()
+                    ": already complete".into()
                 } else {
                     time_left(start.elapsed(), done)
                 };
@@ -82,7 +82,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let page = arguments.out.join("index.html");
     anyhow::ensure!(
         summary.complete,
-        "stopped; what is done is in {}, and the same command goes on from there",
+        "interrupted; the results so far are in {}, and the same command continues from there",
         page.display()
     );
     say!(
@@ -93,7 +93,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Refuses a folder with other files, which those of a reproduction might overwrite.
+/// Rejects a folder with other files, which a reproduction might overwrite.
 fn check_folder(arguments: &Arguments) -> anyhow::Result<()> {
     let folder = &arguments.out;
     let inputs = named("--config", &arguments.config);
@@ -101,13 +101,13 @@ fn check_folder(arguments: &Arguments) -> anyhow::Result<()> {
     let is_empty = std::fs::read_dir(folder).map_or(true, |mut files| files.next().is_none());
     anyhow::ensure!(
         is_empty || folder.join(CLAIMS).exists() || arguments.force,
-        "{} holds other files than a reproduction's; give another --out, or --force to write among them",
+        "{} contains other files than a reproduction's; give another --out, or --force to write into it",
         folder.display()
     );
     Ok(())
 }
 
-/// What is left at the pace so far, once a twentieth is done.
+/// Estimated time left, after a twentieth of the work.
 fn time_left(elapsed: Duration, done: f64) -> String {
     if done < 0.05 {
         return String::new();

@@ -1,4 +1,4 @@
-//! `sim-host schedule`: the amplitude of dither that each wheel speed needs, as the table that the ECU carries.
+//! `sim-host schedule`: the dither amplitude required at each wheel speed, as the ECU's table.
 
 use super::grid::{GridOptions, TimeOptions};
 use super::options::ConfigOptions;
@@ -21,15 +21,15 @@ use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use std::path::{Path, PathBuf};
 
-/// The dither amplitude W that each wheel speed N needs, for square wave and sine: the table that the ECU carries.
+/// Compute the dither amplitude W required at each wheel speed N, for square and sine wave: the ECU's table.
 ///
-/// At each speed the amplitude is scanned upwards from 0, from the scenario's start and from the mirrored one. Where the
-/// undithered motion from both is at rest or of period one, the entry is 0. Elsewhere it is the least amplitude of the first
-/// range that gives period one (one start may end at rest) at that speed and no worse at its neighbours, plus a margin. The
-/// map uses the mean of the dither; the entries are then checked with the true signal at the PWM rate, at the table's speeds
-/// and midway. Ten seconds on 2 cores. Exit code 1 if a speed has no such amplitude or a check fails.
+/// At each speed the amplitude is scanned upwards from 0, from the scenario's initial state and from the mirrored one. If both
+/// trajectories without dither are at rest or of period one, the entry is 0. Otherwise it is the least amplitude of the first range
+/// with period one (one trajectory may be at rest) at that speed and no other regime at its neighbours, plus a margin. The map uses
+/// the averaged dither. The entries are then checked with the true signal at the PWM rate, at the table's speeds and midway. The run
+/// takes about ten seconds on 2 cores. The exit code is 1 if a speed has no such amplitude or a check fails.
 #[derive(clap::Args)]
-// Finer and longer than a map for the eye.
+// Finer and longer than the default map.
 #[command(
     mut_arg("step", |arg| arg.default_value("25")),
     mut_arg("square_to", |arg| arg.default_value("0.15")),
@@ -53,11 +53,11 @@ pub struct Arguments {
     config: ConfigOptions,
     #[command(flatten)]
     grid: GridOptions,
-    /// Equal steps from 0 to the greatest amplitude, instead of --square-step and --sine-step; edges are bisected to a sixteenth of
-    /// a step
+    /// Number of steps from 0 to the greatest amplitude, instead of --square-step and --sine-step; edges are bisected to a sixteenth
+    /// of a step
     #[arg(long, value_name = "COUNT", default_value_t = 30, conflicts_with_all = ["square_step", "sine_step"], value_parser = clap::value_parser!(u32).range(2..=1000))]
     amplitudes: u32,
-    /// How far above the least amplitude an entry lies, as a share of its range from 0 to 1; at least half a PWM count
+    /// Margin above the least amplitude, as a share of its range, from 0 to 1; at least half a PWM count
     #[arg(
         long,
         value_name = "SHARE",
@@ -67,8 +67,8 @@ pub struct Arguments {
     margin: f64,
     #[command(flatten)]
     times: TimeOptions,
-    /// Take the cells of the grid from a map's Parquet file instead of running them; it must be of the same scenario, times and
-    /// grid, from both starts
+    /// Read the cells of the grid from a map's Parquet file instead of computing them; scenario, times and grid must be the same, with
+    /// both initial states
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
     /// Write the table as Rust source, the module `shared_model::schedule_table`
@@ -77,18 +77,18 @@ pub struct Arguments {
     /// Write the map's cells as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write map, entries and checks as JSON
+    /// Write the map, the entries and the checks as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
     /// Draw the map with the schedule as an SVG figure
     #[arg(long, value_name = "FILE")]
     figure: Option<PathBuf>,
-    /// Overwrite files that exist
+    /// Overwrite existing files
     #[arg(long)]
     force: bool,
 }
 
-/// Amplitudes of a schedule, 0 among them.
+/// Allowed numbers of amplitudes, including 0.
 const AMPLITUDES: std::ops::RangeInclusive<usize> = 3..=1001;
 /// An edge is bisected to this share of the step between amplitudes.
 const EDGE_SHARE: f64 = 1.0 / 16.0;
@@ -153,7 +153,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 }
 
 impl Arguments {
-    /// The scenario with this waveform and its plan, checked.
+    /// The validated scenario with this waveform, and its plan.
     fn plan(
         &self,
         scenario: &Scenario<f64>,
@@ -193,7 +193,7 @@ impl Arguments {
         Ok((scenario, plan))
     }
 
-    /// The cells of each plan's grid, as far as there is a map.
+    /// The cells of each plan's grid, if there is a map.
     fn first_cells(
         &self,
         scenario: &Scenario<f64>,
@@ -204,11 +204,11 @@ impl Arguments {
         };
         let [(_, square), (_, sine)] = plans;
         let fitting = from_map::fitting(scenario, square, sine)
-            .context("no map fits this schedule, so leave --map out")?;
+            .context("no map is consistent with this schedule; omit --map")?;
         let (map, cells) = self.read_map(path, &fitting).map_err(|error| {
             let command = self.map_command(path);
             anyhow!(
-                "cannot use {}: {error:#}; this makes one that fits: `{command}`",
+                "cannot use {}: {error:#}; this command creates a consistent map: `{command}`",
                 path.display()
             )
         })?;
@@ -223,10 +223,10 @@ impl Arguments {
         Ok((map, cells))
     }
 
-    /// The command that makes a map: at `path`, unless there is something already.
+    /// The command that creates a map: at `path`, unless a file exists there.
     fn map_command(&self, path: &Path) -> String {
         let path = if path.exists() {
-            Path::new("fitting.parquet")
+            Path::new("consistent.parquet")
         } else {
             path
         };
@@ -243,7 +243,7 @@ impl Arguments {
         self.grid.step.expect("it has a default")
     }
 
-    /// The options of the axes, amplitudes by their number or their steps.
+    /// The options of the axes, with amplitudes by number or by step.
     fn axes(&self, amplitudes: u32) -> String {
         let grid = &self.grid;
         let step = |option, step: Option<f64>| step.map(|step| format!(" --{option} {step}"));
@@ -330,7 +330,7 @@ fn show(analysis: &Analysis) {
         Waveform::Square | Waveform::None => "square wave",
     };
     say!(
-        "{word} (a range ends within {:.1} mV beyond the ends given):",
+        "{word} (range limits are accurate to {:.1} mV):",
         1e3 * analysis.edge_width_v
     );
     for entry in &analysis.entries {
@@ -344,7 +344,7 @@ fn show(analysis: &Analysis) {
             .count()
     };
     say!(
-        "  speeds: {} need none, {} get period one, {} only rest, {} neither",
+        "  speeds: {} without dither, {} with period one, {} only at rest, {} without a solution",
         count(Choice::Undithered),
         count(Choice::PeriodOne),
         count(Choice::Rest),
@@ -353,19 +353,19 @@ fn show(analysis: &Analysis) {
     let failed: Vec<&Cell> = analysis.failed_checks().collect();
     let coexist = analysis.checks.iter().filter(|cell| cell.coexist());
     say!(
-        "  checks with the true signal at the speeds and midway: {} of {} are calm; at {} of them a motion and an equilibrium coexist",
+        "  checks with the true signal at the speeds and midway: {} of {} passed; at {} of them an orbit and an equilibrium coexist",
         analysis.checks.len() - failed.len(),
         analysis.checks.len(),
         coexist.count()
     );
     if analysis.entries[0].amplitude_v > 0.0 {
         say!(
-            "  WARNING: the first speed needs dither already, and the table has none below it; begin lower"
+            "  WARNING: the first speed requires dither, and the table has none below it; reduce --from"
         );
     }
     for cell in failed {
         say!(
-            "  FAILED at {} rpm, {:.4} V: {} from the given start, {} from the mirrored one",
+            "  FAILED at {} rpm, {:.4} V: {} from the given initial state, {} from the mirrored one",
             cell.wheel_speed_rpm,
             cell.amplitude_v,
             cell.given,

@@ -1,4 +1,4 @@
-//! What the plots of a settled motion share: their options, and the motion behind its transient.
+//! Options of the plots of a post-transient trajectory, and its computation.
 
 use super::options::RunOptions;
 use super::options::advice;
@@ -12,15 +12,15 @@ use shared_model::Scenario;
 
 /// Least and greatest transient, s.
 const TRANSIENTS_S: std::ops::RangeInclusive<f64> = 0.0..=100_000.0;
-/// Most states that are kept in memory.
-const MOST_STATES: u32 = 20_000_000;
+/// Maximum number of states in memory.
+const MAX_STATES: u32 = 20_000_000;
 
-/// A run that settles before it is looked at. The dither, if there is one, is on from the start.
+/// A run with an initial transient. The dither, if any, is on from the start.
 #[derive(Args)]
 pub struct SettledRun {
     #[command(flatten)]
     run: RunOptions,
-    /// Time in which the motion settles before the run, s
+    /// Initial transient to discard, before the run, s
     #[arg(
         long,
         value_name = "SECONDS",
@@ -31,12 +31,12 @@ pub struct SettledRun {
 }
 
 impl SettledRun {
-    /// The file that is read, if any.
+    /// The input file, if any.
     pub fn input(&self) -> Option<Named<'_>> {
         self.run.config.input()
     }
 
-    /// The scenario, checked together with the transient.
+    /// The scenario, validated together with the transient.
     pub fn scenario(&self) -> anyhow::Result<Scenario<f64>> {
         let scenario = self.run.scenario()?;
         ensure!(
@@ -49,13 +49,13 @@ impl SettledRun {
         Ok(scenario)
     }
 
-    /// The motion of the scenario behind the transient.
+    /// The scenario's trajectory after the transient.
     pub fn trace(&self, scenario: &Scenario<f64>) -> anyhow::Result<Trace> {
         ensure!(
-            scenario.steps() <= MOST_STATES,
-            "--time {}: must be at most {} s, which is {MOST_STATES} steps",
+            scenario.steps() <= MAX_STATES,
+            "--time {}: must be at most {} s, which is {MAX_STATES} steps",
             Short(scenario.run.duration_s),
-            f64::from(MOST_STATES) * scenario.step_s()
+            f64::from(MAX_STATES) * scenario.step_s()
         );
         let trace = record(&mut after_transient(scenario, self.transient)?, scenario);
         if let Some(end) = early_end(scenario, &trace) {
@@ -66,7 +66,7 @@ impl SettledRun {
     }
 }
 
-/// What a run is, for headings: speed and dither.
+/// Speed and dither of a run, for headings.
 pub fn title(scenario: &Scenario<f64>) -> String {
     use plot::number::four_digits;
     use shared_model::dither::{Application, Waveform};

@@ -10,7 +10,7 @@ use dynamics::words::counted;
 use files::output;
 use std::path::PathBuf;
 
-/// Run a scenario on the host and write its motion as CSV.
+/// Simulate a scenario on the host and write its trajectory as CSV.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host simulate --rpm 1750 --time 20 --out simulate.csv
@@ -21,13 +21,13 @@ use std::path::PathBuf;
 pub struct Arguments {
     #[command(flatten)]
     run: RunOptions,
-    /// File to write
+    /// Output file
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// In f32, as the ECU does, instead of f64
+    /// Compute in f32, as on the ECU, instead of f64
     #[arg(long)]
     f32: bool,
-    /// Overwrite the file if it exists
+    /// Overwrite an existing file
     #[arg(long)]
     force: bool,
 }
@@ -42,7 +42,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         simulate(&scenario)?
     };
     if let Some(end) = early_end(&scenario, &trace) {
-        bail!("{end}; nothing was written. {}", advice(end.reason));
+        bail!("{end}; no file was written. {}", advice(end.reason));
     }
     write(&trace, &arguments.out, arguments.force)?;
     say!(
@@ -54,7 +54,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Writes a trace as CSV, one row a model step; the duty code is that of the step's last PWM period.
+/// Writes a trajectory as CSV, one row per model step; the duty code is that of the step's last PWM period.
 pub fn write(trace: &Trace, path: &std::path::Path, force: bool) -> anyhow::Result<()> {
     Ok(output::write(path, force, |to| {
         let mut csv = csv::Writer::from_writer(to);

@@ -1,4 +1,4 @@
-//! `sim-host spectrum`: power spectrum of the settled motion.
+//! `sim-host spectrum`: power spectrum after the transient.
 
 use super::outcome::Outcome;
 use super::output::Destinations;
@@ -12,12 +12,12 @@ use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use std::f64::consts::TAU;
 
-/// Segments of half overlap that a run has by default.
+/// Default number of segments, with half overlap.
 const SEGMENTS: f64 = 8.0;
 
-/// Power spectrum of the settled motion by Welch's method (Hann window, half overlap, one-sided density).
+/// Estimate a power spectrum after the transient by Welch's method (Hann window, half overlap, one-sided density).
 ///
-/// The dither, if there is one, is applied as the true signal, so that its line shows.
+/// The dither, if any, is applied as the true signal, so that the spectrum has its line.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host spectrum --rpm 1750 --time 200 --figure spectrum.svg
@@ -33,7 +33,7 @@ pub struct Arguments {
     /// Component of the state
     #[arg(long, value_name = "COMPONENT", default_value = "yaw_rate")]
     component: Component,
-    /// Length of a segment, s; lines closer than 2/SECONDS Hz merge. Without, two ninths of the run: eight segments
+    /// Length of a segment, s; lines closer than 2/SECONDS Hz merge [default: two ninths of the run, which gives eight segments]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     segment: Option<f64>,
     #[command(flatten)]
@@ -98,12 +98,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let (low, high) = trace.range(component.index, 0);
     ensure!(
         high - low > 1e-9,
-        "the motion is at rest: {component} ranges from {low} to {high} {}, so it has no spectrum; nothing was written",
+        "the trajectory is at rest: {component} ranges from {low} to {high} {}, so it has no spectrum; no file was written",
         component.unit
     );
     let signal: Vec<f64> = trace.component(component.index).collect();
     let spectrum = welch(&signal, scenario.model_rate_hz(), segment)?;
-    let results = results(arguments, &scenario, &spectrum).context("nothing was written")?;
+    let results = results(arguments, &scenario, &spectrum).context("no file was written")?;
     arguments.destinations.write(&results.bins, &results, || {
         let component = results.component;
         let dither = results.dither.as_ref();

@@ -1,4 +1,4 @@
-//! What the program prints for people: on standard output, unless data goes there.
+//! Messages of the program: on standard output, unless data is written there.
 
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static DATA_IS_THERE: AtomicBool = AtomicBool::new(false);
 static FAILURE: OnceLock<io::Error> = OnceLock::new();
 
-/// Prints a line as `println!` does. A failure is kept for [`finish`]; nothing is printed after it.
+/// Prints a line as `println!` does. A failure is stored for [`finish`], and nothing is printed after it.
 macro_rules! say {
     ($($line:tt)*) => {
         $crate::cli::stdout::print(format_args!($($line)*))
@@ -36,7 +36,7 @@ pub fn print(line: Arguments) {
     }
 }
 
-/// Whether everything could be printed. A reader that has seen enough and closes the pipe (`| head`) is no failure.
+/// Reports a failed print. A reader that closes the pipe early (`| head`) is not a failure.
 pub fn finish() -> anyhow::Result<()> {
     if let Err(error) = io::stdout().flush() {
         FAILURE.get_or_init(|| error);

@@ -1,4 +1,4 @@
-//! What the subcommands share that make many runs: range, times, cost, progress and the end by Ctrl-C.
+//! Options and progress of the subcommands with many runs: range, times, estimated cost and interruption.
 
 use super::options::RunOptions;
 use anyhow::{bail, ensure};
@@ -14,32 +14,32 @@ use shared_model::dither::Waveform;
 use sim_host::paper::REGION_EDGES_RPM;
 use std::time::Instant;
 
-/// More runs than this have their cost said first.
+/// Number of runs above which the estimated cost is printed.
 const MANY: usize = 1000;
-/// More runs than this have to be confirmed.
+/// Number of runs above which `--yes` is required.
 const TOO_MANY: usize = 20_000;
-/// Length of the runs that are timed for the cost, s.
+/// Length of the runs that are timed for the estimate, s.
 const TIMED_S: f64 = 10.0;
 
-/// What is swept.
+/// Swept parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Over {
-    /// The wheel speed, rpm
+    /// Wheel speed, rpm
     Speed,
-    /// The dither's amplitude, V
+    /// Dither amplitude, V
     Amplitude,
 }
 
-/// The parameter that is swept, and its values. Results ascend whichever end comes first.
+/// The swept parameter and its values. Results are in ascending order for both orders of the ends.
 #[derive(Args)]
 pub struct RangeOptions {
     /// Parameter to sweep
     #[arg(long, value_enum, default_value_t = Over::Speed)]
     over: Over,
-    /// One end of its values, from which the steps count, rpm or V [default: 1550 rpm; 0 V]
+    /// First value, at which the steps begin, rpm or V [default: 1550 rpm; 0 V]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     from: Option<f64>,
-    /// Other end, which may be the lower one, rpm or V [default: 1900 rpm; 0.14 V of square wave, 1.4 V of sine]
+    /// Last value, which may be the lower one, rpm or V [default: 1900 rpm; 0.14 V of square wave, 1.4 V of sine]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     to: Option<f64>,
     /// Step, rpm or V [default: 5 rpm; 0.002 V of square wave, 0.02 V of sine]
@@ -72,10 +72,10 @@ impl RangeOptions {
     }
 }
 
-/// A range of wheel speeds instead of one. Results ascend whichever end comes first.
+/// A range of wheel speeds instead of one. Results are in ascending order for both orders of the ends.
 #[derive(Args)]
 pub struct SpeedRange {
-    /// One end of a range of wheel speeds, from which the steps count, rpm
+    /// First wheel speed of a range, at which the steps begin, rpm
     #[arg(
         long,
         value_name = "RPM",
@@ -84,7 +84,7 @@ pub struct SpeedRange {
         conflicts_with = "rpm"
     )]
     from: Option<f64>,
-    /// Other end, which may be the lower one, rpm
+    /// Last wheel speed, which may be the lower one, rpm
     #[arg(
         long,
         value_name = "RPM",
@@ -104,7 +104,7 @@ pub struct SpeedRange {
 }
 
 impl SpeedRange {
-    /// The speeds; without a range that of the scenario alone.
+    /// The speeds; without a range, the scenario's speed alone.
     pub fn values(&self, scenario: &Scenario<f64>) -> Result<Values, SweepError> {
         let rpm = scenario.run.wheel_speed_rpm;
         let (from, to) = (self.from.unwrap_or(rpm), self.to.unwrap_or(rpm));
@@ -115,7 +115,7 @@ impl SpeedRange {
 /// The times of each run.
 #[derive(Args)]
 pub struct TransientOptions {
-    /// What of each run is not looked at, s; `--time` is the whole run
+    /// Initial transient of each run to discard, s; `--time` includes it
     #[arg(
         long,
         value_name = "SECONDS",
@@ -123,19 +123,19 @@ pub struct TransientOptions {
         allow_negative_numbers = true
     )]
     transient: f64,
-    /// Make more than 20,000 runs without asking
+    /// Allow more than 20,000 runs
     #[arg(long)]
     yes: bool,
 }
 
 impl TransientOptions {
-    /// The times, `observed_s` being looked at unless `--time` says otherwise.
+    /// The times; `observed_s` after the transient is the default.
     pub fn timing(&self, run: &RunOptions, observed_s: f64) -> Result<Timing, SweepError> {
         let time_s = run.time.unwrap_or(self.transient + observed_s);
         Timing::new(self.transient, time_s)
     }
 
-    /// Says what many runs cost, of which so many go side by side, and refuses too many unless they are confirmed.
+    /// Prints the estimated cost of many runs, of which `at_once` run in parallel. Rejects too many runs unless confirmed.
     pub fn announce(
         &self,
         runs: usize,
@@ -164,19 +164,19 @@ impl TransientOptions {
         );
         ensure!(
             runs <= TOO_MANY || self.yes,
-            "{cost}; give --yes to make more than {TOO_MANY}"
+            "{cost}; must be at most {TOO_MANY} runs, unless --yes is given"
         );
         eprintln!("{cost}");
         Ok(())
     }
 }
 
-/// Independent runs that go side by side on all threads.
+/// Number of independent runs in parallel on all threads.
 pub fn side_by_side() -> usize {
     LARGEST_BATCH * rayon::current_num_threads()
 }
 
-/// Does the work with progress on a terminal, `runs` being expected.
+/// Does the work with progress on a terminal; `runs` is the expected number of runs.
 pub fn with_progress<R>(runs: usize, work: impl FnOnce(RunControl) -> R) -> R {
     let style =
         ProgressStyle::with_template("{elapsed_precise} [{bar:40}] {pos}/{len} runs, {eta} left")
@@ -191,11 +191,11 @@ pub fn with_progress<R>(runs: usize, work: impl FnOnce(RunControl) -> R) -> R {
     result
 }
 
-/// After Ctrl-C: says what was kept, as the reason why the job was not done in full.
+/// After Ctrl-C, returns an error with the number of completed runs.
 pub fn check_interrupted(done: usize, of: usize) -> anyhow::Result<()> {
     if interrupt::requested() {
         bail!(
-            "interrupted after {done} of {}; the files asked for hold these",
+            "interrupted after {done} of {}; the requested files contain their results",
             counted(of, "run")
         );
     }

@@ -9,8 +9,8 @@ use dynamics::config::validate;
 use dynamics::words::Short;
 use serde::Serialize;
 
-/// Cornering force against slip angle (Figure 2): both roads of Table 1, front and rear, Magic Formula and cubic tyre; and the
-/// configured road if it is another.
+/// Compute the cornering force as a function of the slip angle (Figure 2): both roads of Table 1, front and rear, Magic Formula and
+/// cubic tyre; also the configured road, if it differs.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host tires --figure fig2.svg
@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The end of an axis of angles, checked.
+/// The validated end of an axis of angles.
 pub fn greatest_angle(option: &str, angle_rad: f64) -> anyhow::Result<f64> {
     let (least, most) = (1e-4, std::f64::consts::FRAC_PI_2);
     ensure!(

@@ -1,4 +1,4 @@
-//! `sim-host verify`: the main job.
+//! `sim-host verify`: verification of the firmware.
 
 use super::emulator::open_image;
 use super::options::{ConfigOptions, time_out};
@@ -18,11 +18,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Run the ECU in QEMU beside the same model on the host, and report whether they agree and whether the dither suppresses the
-/// chaos.
+/// Run the ECU in QEMU and the same model on the host, and report whether their results are equivalent and whether the dither
+/// suppresses the chaos.
 ///
-/// Runs 1750 rpm without dither, with a square wave of 0.1 V and with a sine of 1.0 V; 1600, 1845 and 1880 rpm without
-/// dither; the two dithers as true signals; and one run on a second core. Writes index.html, verdict.json, junit.xml and
+/// The runs are: 1750 rpm without dither, with a square wave of 0.1 V and with a sine wave of 1.0 V; 1600, 1845 and 1880 rpm without
+/// dither; both dithers as true signals; and one run on a second core. The outputs are index.html, verdict.json, junit.xml and
 /// figures.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -40,31 +40,31 @@ pub struct Arguments {
         default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
     )]
     firmware: PathBuf,
-    /// The same compiled with the functions' frames, for the worst stack; `cargo xtask proofs` builds it
+    /// The same image compiled with stack sizes, for the worst stack; `cargo xtask proofs` builds it
     #[arg(
         long,
         value_name = "ELF",
         default_value = "target/stack-sizes/mps2/thumbv7em-none-eabihf/firmware/ecu"
     )]
     stack_sizes: PathBuf,
-    /// Folder with the recorded proofs, which the report shows
+    /// Folder with the recorded proofs, for the report
     #[arg(long, value_name = "FOLDER", default_value = "tests/golden")]
     proofs: PathBuf,
     /// Folder for the report
     #[arg(long, value_name = "FOLDER", default_value = "target/report")]
     out: PathBuf,
-    /// Overwrite a report that is there
+    /// Overwrite an existing report
     #[arg(long)]
     force: bool,
     /// Length of each main run on the target, s
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     duration_s: f64,
-    /// Longest time that one run in QEMU may take, s
+    /// Time limit for one run in QEMU, s
     #[arg(long, value_name = "SECONDS", default_value_t = 300.0)]
     time_out: f64,
 }
 
-/// Shorter runs hold too few cycles for a period and an exponent.
+/// Shorter runs have too few cycles for a period and an exponent.
 const DURATIONS_S: std::ops::RangeInclusive<f64> = 60.0..=3600.0;
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
@@ -101,7 +101,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 }
 
 impl Arguments {
-    /// A report is there if one of its files is.
+    /// A report exists if one of its files exists.
     fn check_outputs(&self) -> anyhow::Result<()> {
         let inputs = [
             ("--firmware", self.firmware.as_path()),
@@ -142,7 +142,9 @@ fn with_progress(options: &Options) -> anyhow::Result<Verification> {
     let verification = verify(options, |progress| match progress {
         Progress::Planned(seconds) => bar.inc_length(seconds as u64),
         Progress::Simulated(seconds) => {
-            let mut total_s = simulated_s.lock().expect("nobody panics with it");
+            let mut total_s = simulated_s
+                .lock()
+                .expect("no thread panics while it is locked");
             *total_s += seconds;
             bar.set_position(*total_s as u64);
         }

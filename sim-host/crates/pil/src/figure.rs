@@ -1,7 +1,7 @@
 //! A manoeuvre in the loop against time: what the vehicle does and what the ECU commands.
 
+use crate::closed_loop::Run;
 use crate::record::Record;
-use crate::run::Run;
 use plot::axes::{Axes, stack, stack_height};
 use plot::axis::Axis;
 use plot::figure::{Sample, figure};

@@ -3,8 +3,8 @@
 //! The file: a magic number, the ECU's scenario as TOML behind its length, the number of PWM periods, two packets a period,
 //! and a CRC-32 over everything before it. Numbers are little-endian.
 
+use super::closed_loop::Exchange;
 use super::ecu::{Ecu, Software};
-use super::run::Exchange;
 use shared_model::Scenario;
 use shared_model::exchange::{PACKET_LEN, Packet, PacketBytes};
 use std::io::Write;

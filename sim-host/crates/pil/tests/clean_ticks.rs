@@ -1,9 +1,9 @@
 //! No false alarm: the ECU's program in the loop on clean drives, and the gate finds nothing. The test in every run takes a
 //! million control ticks; ten million take minutes: `cargo test --release -p sim-host --test clean_ticks -- --ignored`.
 
-use pil::drive::{Drive, ecu_scenario};
 use pil::ecu::{Ecu, Software};
 use pil::manoeuvre::{Manoeuvre, load};
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
@@ -35,15 +35,15 @@ fn drives() -> Vec<(Scenario<f64>, Manoeuvre)> {
 
 /// Drives once; returns the control ticks.
 fn drive(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u64 {
-    let mut drive = Drive::new(scenario, manoeuvre).expect("valid");
+    let mut vehicle = VehicleNode::new(scenario, manoeuvre).expect("valid");
     let mut ecu = Software::new(&ecu_scenario(scenario, manoeuvre)).expect("valid");
-    let periods = drive.total_periods();
+    let periods = vehicle.total_periods();
     for _ in 0..periods {
-        let answered = ecu.period(&mut |packet| drive.answer(packet));
+        let answered = ecu.period(&mut |packet| vehicle.answer(packet));
         answered.expect("the host's own program is always there");
     }
     // Every fault is latched, so its last word tells of all ticks.
-    let actuation = drive.actuation().expect("the ECU talks");
+    let actuation = vehicle.actuation().expect("the ECU talks");
     let faults: Vec<_> = Faults::from_bits(actuation.faults)
         .iter()
         .map(|fault| fault.name())

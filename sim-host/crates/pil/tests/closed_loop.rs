@@ -2,10 +2,11 @@
 
 use dynamics::extrema::Extrema;
 use dynamics::period::{Period, period_of_maxima};
-use pil::drive::{Drive, ecu_scenario};
+use pil::closed_loop::{Run, run};
+use pil::comparison::{Depth, compare};
 use pil::ecu::{Ecu, Model, Software};
 use pil::manoeuvre::{Manoeuvre, load};
-use pil::run::{Depth, Run, compare, run};
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::ecu_schedule::Table;
@@ -16,8 +17,8 @@ const TICK_S: f64 = 1e-3;
 
 fn drive(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Run {
     let mut ecu = Software::new(&ecu_scenario(scenario, manoeuvre)).expect("it is valid");
-    let drive = Drive::new(scenario, manoeuvre).expect("it is valid");
-    run(&mut ecu, drive, || {}).expect("a program on the host is reached")
+    let vehicle = VehicleNode::new(scenario, manoeuvre).expect("it is valid");
+    run(&mut ecu, vehicle, || {}).expect("a program on the host is reached")
 }
 
 /// The motion's period over the run's second half.
@@ -132,8 +133,10 @@ fn every_level_on_the_host_agrees_whatever_the_sensors() {
         scenario.run.duration_s = 6.0;
         let own = ecu_scenario(&scenario, &manoeuvre);
         let drive_with = |ecu: &mut dyn Ecu| {
-            let drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
-            run(ecu, drive, || {}).expect("it is on the host").exchanges
+            let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
+            run(ecu, vehicle, || {})
+                .expect("it is on the host")
+                .exchanges
         };
         let model = drive_with(&mut Model::new(&own).expect("it is valid"));
         let software = drive_with(&mut Software::new(&own).expect("it is valid"));

@@ -1,14 +1,17 @@
-//! Faults between vehicle and ECU and in its interrupts, with the ECU's program on this host.
+//! Faults between vehicle and ECU and in the ECU's interrupts, with the ECU's program on the host.
 
-use pil::drive::{Drive, ecu_scenario};
 use pil::ecu::{Ecu, Software};
-use pil::fault::campaign::{Clean, Row, inject, totals};
 use pil::fault::catalogue::{self, Class, Fault, Kind, SensorFailure, Signal};
+use pil::fault::host::{FaultFree, inject};
+use pil::fault::injection::Injection;
 use pil::fault::injector::Injector;
-use pil::fault::judge::{Finder, Judge, Reaction, Verdict};
+use pil::fault::judge::{Detector, Judge, Reaction, Verdict};
+use pil::fault::row::Row;
 use pil::fault::tasks::Tasks;
-use pil::fault::{accepted, manoeuvres};
+use pil::fault::totals::totals;
+use pil::fault::{manoeuvres, waivers};
 use pil::manoeuvre::Manoeuvre;
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use shared_model::Scenario;
 use shared_model::exchange::Packet;
 use shared_model::gate::Fault as GateFault;
@@ -26,14 +29,14 @@ fn manoeuvre(name: &str) -> (Scenario<f64>, Manoeuvre) {
 }
 
 fn rows(names: &[&str], faults: &[Fault]) -> Vec<Row> {
-    let cleans: Vec<Clean> = names
+    let fault_free: Vec<FaultFree> = names
         .iter()
         .map(|name| {
             let (scenario, manoeuvre) = manoeuvre(name);
-            Clean::drive(&scenario, &manoeuvre, &[TIME_S]).expect("it is valid")
+            FaultFree::run(&scenario, &manoeuvre, &[TIME_S]).expect("it is valid")
         })
         .collect();
-    inject(&cleans, faults, || {}).expect("nobody interrupts")
+    inject(&fault_free, faults, || {}).expect("it is not interrupted")
 }
 
 fn nan() -> Fault {
@@ -44,12 +47,12 @@ fn nan() -> Fault {
 }
 
 #[test]
-fn no_silent_fault_outside_the_list() {
+fn every_undetected_fault_has_a_waiver() {
     let faults = catalogue::all();
     let rows = rows(&[CONSTANT_SPEED, "speed ramp"], &faults);
     assert_eq!(rows.len(), 2 * faults.len());
-    let unlisted: Vec<&Row> = rows.iter().filter(|row| row.is_unlisted()).collect();
-    assert!(unlisted.is_empty(), "{unlisted:#?}");
+    let failures: Vec<&Row> = rows.iter().filter(|row| row.is_failure()).collect();
+    assert!(failures.is_empty(), "{failures:#?}");
     let totals = totals(&rows);
     for class in [
         Class::Sensor,
@@ -60,143 +63,142 @@ fn no_silent_fault_outside_the_list() {
     ] {
         assert!(totals[&class].detected > 0, "{class:?}");
     }
-    // What no sensor can give is found at once, everywhere.
+    // A value that no sensor can have is detected immediately, on every manoeuvre.
     let impossible = [
         "sensor NaN",
         "sensor infinite",
         "sensor subnormal",
         "sensor out of range",
     ];
-    for row in rows
-        .iter()
-        .filter(|row| impossible.contains(&row.kind.as_str()))
-    {
+    for row in rows.iter().filter(|row| impossible.contains(&row.kind)) {
         assert_eq!(
             (row.verdict, row.latency_ticks),
             (Verdict::Detected, Some(1)),
             "{row:?}"
         );
     }
-    // The list is no blank cheque: its entries are met, and most faults are not on it.
-    let listed = rows.iter().filter(|row| row.accepted.is_some()).count();
+    // Waivers are used, and cover less than a third of the faults.
+    let waived = rows.iter().filter(|row| row.waiver.is_some()).count();
     assert!(
-        listed > 0 && 3 * listed < rows.len(),
-        "{listed} of {}",
+        waived > 0 && 3 * waived < rows.len(),
+        "{waived} of {}",
         rows.len()
     );
-    assert_eq!(accepted::reason(&nan()), None);
+    assert_eq!(waivers::rationale(&Injection::Loop(nan())), None);
 }
 
-/// The program with interrupts that can fail is the program, and without a fault nothing is found.
+/// The program with interrupts that can fail equals the program, and nothing is detected without a fault.
 #[test]
-fn without_a_fault_nothing_is_found() {
+fn nothing_is_detected_without_a_fault() {
     let (mut scenario, manoeuvre) = manoeuvre("low resolution and noise");
     scenario.run.duration_s = 5.0;
     let own = ecu_scenario(&scenario, &manoeuvre);
     let mut software = Software::new(&own).expect("it is valid");
     let mut tasks = Tasks::new(&own).expect("it is valid");
-    let mut drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
-    let mut twin = drive.clone();
-    let mut between = Injector::new(&scenario);
-    // Behind the first frames, which start everything.
+    let mut vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
+    let mut second = vehicle.clone();
+    let mut injector = Injector::new(&scenario);
+    // After the first frames, during the start.
     let first_tick = 10;
     let mut judge = Judge::new(scenario.periods_per_tick(), first_tick);
-    for _ in 0..drive.total_periods() {
+    for _ in 0..vehicle.total_periods() {
         let (mut a, mut b) = (None, None);
-        let told = software.period(&mut |sent| {
+        let answered = software.period(&mut |sent| {
             a = Some(*sent);
-            drive.answer(sent)
+            vehicle.answer(sent)
         });
-        told.expect("a program on the host is always reached");
+        answered.expect("a program on the host is always reached");
         tasks.period(&mut |sent| {
             b = Some(*sent);
-            twin.answer_through(&mut between, sent)
+            second.answer_through(&mut injector, sent)
         });
         assert_eq!(a, b);
-        if twin.periods() > first_tick * scenario.periods_per_tick() {
-            judge.look(&b.unwrap(), &a.unwrap(), &twin);
+        if second.periods() > first_tick * scenario.periods_per_tick() {
+            judge.observe(&b.unwrap(), &a.unwrap(), &second);
         }
     }
-    let outcome = judge.conclude(between.stays_wrong());
+    let outcome = judge.outcome(injector.is_value_corrupted());
     assert_eq!(
-        (outcome.verdict, outcome.finding),
-        (Verdict::Harmless, None)
+        (outcome.verdict, outcome.detection),
+        (Verdict::NoEffect, None)
     );
     assert!(outcome.peaks.steering_angle_rad > 0.1);
 }
 
-/// One count of duty that differs and is nowhere told is a silent fault.
+/// A duty that differs by one count and raises no diagnostic is an undetected fault.
 #[test]
-fn a_planted_silent_fault_is_found() {
+fn a_planted_undetected_fault_is_classified() {
     let (scenario, manoeuvre) = manoeuvre(CONSTANT_SPEED);
-    let mut drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
-    let clean = Packet {
+    let mut vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
+    let fault_free = Packet {
         duty_code: 1250,
         frame: None,
     };
-    drive.answer(&clean);
+    vehicle.answer(&fault_free);
     let mut judge = Judge::new(scenario.periods_per_tick(), 0);
-    // The vehicle has no frame yet, which is not this test's subject.
+    // Until the vehicle has its first frame.
     let mut tasks = Tasks::new(&ecu_scenario(&scenario, &manoeuvre)).expect("it is valid");
     for _ in 0..25 {
-        tasks.period(&mut |sent| drive.answer(sent));
+        tasks.period(&mut |sent| vehicle.answer(sent));
     }
-    assert!(drive.actuation().is_some());
-    judge.look(&clean, &clean, &drive);
-    assert_eq!(judge.conclude(false).verdict, Verdict::Harmless);
-    assert_eq!(judge.conclude(true).verdict, Verdict::Silent);
+    assert!(vehicle.actuation().is_some());
+    judge.observe(&fault_free, &fault_free, &vehicle);
+    assert_eq!(judge.outcome(false).verdict, Verdict::NoEffect);
+    assert_eq!(judge.outcome(true).verdict, Verdict::Undetected);
     let off = Packet {
         duty_code: 1251,
-        ..clean
+        ..fault_free
     };
-    judge.look(&off, &clean, &drive);
-    assert_eq!(judge.conclude(false).verdict, Verdict::Silent);
+    judge.observe(&off, &fault_free, &vehicle);
+    assert_eq!(judge.outcome(false).verdict, Verdict::Undetected);
 }
 
-/// In the safe state the chaos comes back, unless the vehicle slows down as it is asked to.
+/// In the safe state the chaos returns, unless the vehicle slows down as demanded.
 #[test]
-fn behind_the_safe_state_a_vehicle_that_obeys_calms_down() {
-    let heedless = last_swing_rad_per_s(CONSTANT_SPEED);
-    let obeying = last_swing_rad_per_s("obeyed speed limit");
-    println!("swing of the yaw rate: {heedless} rad/s heedless, {obeying} rad/s obeying");
-    assert!(heedless > 0.5, "{heedless}");
-    assert!(obeying < 1e-3, "{obeying}");
+fn after_the_safe_state_a_vehicle_that_slows_down_turns_steadily() {
+    let constant = last_peak_to_peak_rad_per_s(CONSTANT_SPEED);
+    let slowing = last_peak_to_peak_rad_per_s("obeyed speed limit");
+    println!(
+        "peak-to-peak yaw rate: {constant} rad/s at constant speed, {slowing} rad/s after slowing down"
+    );
+    assert!(constant > 0.5, "{constant}");
+    assert!(slowing < 1e-3, "{slowing}");
 }
 
-/// Drives into a fault and gives the swing of the yaw rate in the last two seconds.
-fn last_swing_rad_per_s(name: &str) -> f64 {
+/// The peak-to-peak yaw rate of the last two seconds of a run with a fault.
+fn last_peak_to_peak_rad_per_s(name: &str) -> f64 {
     let (scenario, manoeuvre) = manoeuvre(name);
     let mut tasks = Tasks::new(&ecu_scenario(&scenario, &manoeuvre)).expect("it is valid");
-    let mut drive = Drive::new(&scenario, &manoeuvre).expect("it is valid");
-    let mut between = Injector::new(&scenario);
+    let mut vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
+    let mut injector = Injector::new(&scenario);
     let mut judge = Judge::new(scenario.periods_per_tick(), 0);
     let (mut least, mut greatest) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut is_on = false;
-    for _ in 0..drive.total_periods() {
-        if !is_on && drive.plant().time_s() >= TIME_S {
-            between.begin(nan());
+    for _ in 0..vehicle.total_periods() {
+        if !is_on && vehicle.plant().time_s() >= TIME_S {
+            injector.begin(nan());
             is_on = true;
         }
-        let mut put_out = None;
+        let mut sent_last = None;
         tasks.period(&mut |sent| {
-            put_out = Some(*sent);
-            drive.answer_through(&mut between, sent)
+            sent_last = Some(*sent);
+            vehicle.answer_through(&mut injector, sent)
         });
-        let put_out = put_out.expect("a duty in every period");
+        let sent_last = sent_last.expect("a duty in every period");
         if is_on {
-            judge.look(&put_out, &put_out, &drive);
+            judge.observe(&sent_last, &sent_last, &vehicle);
         }
-        if drive.plant().time_s() > scenario.run.duration_s - 2.0 {
-            let yaw_rate = drive.plant().truth().yaw_rate_rad_per_s;
+        if vehicle.plant().time_s() > scenario.run.duration_s - 2.0 {
+            let yaw_rate = vehicle.plant().truth().yaw_rate_rad_per_s;
             (least, greatest) = (yaw_rate.min(least), yaw_rate.max(greatest));
         }
     }
-    let outcome = judge.conclude(false);
+    let outcome = judge.outcome(false);
     assert_eq!(outcome.reaction, Reaction::SafeState);
-    let finder = outcome.finding.map(|finding| finding.finder);
+    let detector = outcome.detection.map(|first| first.detector);
     assert!(
-        matches!(finder, Some(Finder::Gate(faults)) if faults.contains(GateFault::SensorNotANumber)),
-        "{finder:?}"
+        matches!(detector, Some(Detector::Gate(faults)) if faults.contains(GateFault::SensorNotANumber)),
+        "{detector:?}"
     );
     greatest - least
 }

@@ -9,7 +9,7 @@ use qemu::meaning;
 use qemu::telemetry::Recording;
 use std::path::PathBuf;
 
-/// Check a telemetry file of the firmware, say how its run ended, and write its motion as CSV.
+/// Check a telemetry file of the firmware, report how its run ended, and write its trajectory as CSV.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host firmware run target/thumbv7em-none-eabihf/firmware/ecu \\
@@ -18,10 +18,10 @@ use std::path::PathBuf;
 pub struct Arguments {
     /// Telemetry file
     telemetry: PathBuf,
-    /// File to write
+    /// Output file
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Overwrite the file if it exists
+    /// Overwrite an existing file
     #[arg(long)]
     force: bool,
 }

@@ -1,4 +1,4 @@
-//! `sim-host firmware image`: what a firmware image needs of its board, and how deep its stack can get.
+//! `sim-host firmware image`: size and worst stack of a firmware image.
 
 use crate::cli::emulator::open_image;
 use crate::cli::outcome::Outcome;
@@ -11,24 +11,24 @@ use serde::Serialize;
 use sim_host::firmware::PRIORITIES;
 use std::path::PathBuf;
 
-/// Show an image's size and its worst stack with the calls that lead there, read from the machine code.
+/// Report the size of an image and its worst stack with the chain of calls, computed from the machine code.
 ///
-/// The image has to be compiled with `-Zemit-stack-sizes`, as `cargo xtask proofs` does. The stack's figure is a bound:
-/// main program, control task, PWM interrupt, hard fault and watchdog each at their deepest, one on top of the other.
+/// The image must be compiled with `-Zemit-stack-sizes`, as by `cargo xtask proofs`. The worst stack is an upper bound: the sum of the
+/// deepest stacks of main program, control task, PWM interrupt, hard fault and watchdog, which preempt each other.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   cargo xtask proofs
   sim-host firmware image --json stack.json \\
       target/stack-sizes/mps2/thumbv7em-none-eabihf/firmware/ecu
 
-Exit code 1 if there is no bound (recursion, unknown frames), or less RAM than it takes.")]
+The exit code is 1 if there is no bound (recursion, unknown frames), or if it exceeds the RAM.")]
 pub struct Arguments {
     /// Firmware image (ELF)
     image: PathBuf,
     /// Write all figures as JSON
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Overwrite the file if it exists
+    /// Overwrite an existing file
     #[arg(long)]
     force: bool,
 }
@@ -71,7 +71,7 @@ fn show(image: &Image, stack: &Stack) {
         counted(image.ram_bytes, "byte")
     );
     say!(
-        "worst stack {} of {} bytes: {} between the levels, and",
+        "worst stack {} of {} bytes: {} for exception frames, and",
         stack.worst_bytes,
         stack.room_bytes,
         stack.exception_frames_bytes
@@ -83,13 +83,13 @@ fn show(image: &Image, stack: &Stack) {
         }
     }
     say!(
-        "frames: {} stated by the compiler, {} of them confirmed by their instructions; {} counted from the instructions alone",
+        "frames: {} given by the compiler, {} of them confirmed by their instructions; {} computed from the instructions only",
         stack.stated_functions,
         stack.confirmed_functions,
         stack.counted_functions
     );
     say!(
-        "calls through pointers, to any of {}: {}",
+        "callers through pointers, each to any of {}: {}",
         counted(stack.address_taken, "function"),
         stack.indirect_callers.join(", ")
     );

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 use toml::{Table, Value};
 
-/// Run a firmware image in QEMU: show its log, pass its exit code on, and end with it.
+/// Run a firmware image in QEMU, print its log, and return its exit code.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples (cargo runs this from firmware/: `cargo run -- SETTINGS`):
@@ -26,27 +26,27 @@ use toml::{Table, Value};
       target/thumbv7em-none-eabihf/firmware/ecu run.duration_s=5
 
 Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME and telemetry=FILE.
-Exit codes are the firmware's: 0 complete, as its log and its telemetry say too; 10 scenario refused, 11 telemetry, 12 overrun, 13 panic, 14 hard fault, 15
-watchdog, 16 unexpected interrupt; 2 if it could not be run or did not end in time."
+Exit codes are the firmware's: 0 complete, confirmed by log and telemetry; 10 scenario rejected, 11 telemetry, 12 overrun, 13 panic,
+14 hard fault, 15 watchdog, 16 unexpected interrupt. The exit code is 2 if the image could not be run or did not end in time."
 )]
 pub struct Arguments {
     /// Machine to emulate
     #[arg(long, value_parser = machines(), default_value = "mps2-an386")]
     machine: Machine,
-    /// Longest time that the run may take, s
+    /// Time limit for the run, s
     #[arg(long, value_name = "SECONDS", default_value_t = 120.0)]
     time_out: f64,
-    /// Overwrite the telemetry file if it exists
+    /// Overwrite an existing telemetry file
     #[arg(long)]
     force: bool,
     /// Firmware image (ELF)
     image: PathBuf,
-    /// Settings, `key=value`, after the image
+    /// Settings after the image, as `key=value`
     #[arg(trailing_var_arg = true)]
     settings: Vec<String>,
 }
 
-/// Keys of settings that are no parameters of a scenario: of every image, and of the fault drill.
+/// Keys of settings that are not parameters of a scenario: for every image, and for the fault drill.
 const OWN_KEYS: [&str; 2] = [TELEMETRY, "fault="];
 const TELEMETRY: &str = "telemetry=";
 
@@ -57,12 +57,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let decoder = LogDecoder::new(&image)?;
     if !decoder.is_readable() {
         eprintln!(
-            "warning: {} has no defmt symbols: the run has no log, and is judged by its exit code{}",
+            "warning: {} has no defmt symbols: the run has no log, and its outcome is determined by its exit code{}",
             arguments.image.display(),
             if telemetry(arguments).is_some() {
                 " and its telemetry"
             } else {
-                " alone"
+                " only"
             }
         );
     }
@@ -92,7 +92,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     ))
 }
 
-/// Refuses, before anything is started, what the firmware would refuse by name.
+/// Rejects settings that the firmware would reject, before it is started.
 fn check_settings(settings: &[String]) -> anyhow::Result<()> {
     let mut scenario = Scenario::<f32>::reconstruction();
     for setting in settings {
@@ -102,7 +102,7 @@ fn check_settings(settings: &[String]) -> anyhow::Result<()> {
         );
         ensure!(
             !setting.contains(char::is_whitespace),
-            "setting {setting:?}: the firmware takes no blanks in a setting"
+            "setting {setting:?}: must not contain spaces"
         );
         if OWN_KEYS.iter().any(|key| setting.starts_with(key)) {
             continue;
@@ -114,7 +114,7 @@ fn check_settings(settings: &[String]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Why a setting is none: in the words of the configuration, which has the same keys and lists what could be meant.
+/// The error of an invalid setting: that of the configuration, which has the same keys and lists similar ones.
 fn refusal(setting: &str, error: SettingError) -> anyhow::Error {
     let in_configuration = setting.split_once('=').and_then(|(key, value)| {
         let value = Value::String(value.into());
@@ -129,20 +129,20 @@ fn refusal(setting: &str, error: SettingError) -> anyhow::Error {
     }
 }
 
-/// The telemetry file that is asked for; of several the last, as the firmware takes it.
+/// The requested telemetry file; of several, the last, as in the firmware.
 fn telemetry(arguments: &Arguments) -> Option<&Path> {
     let paths = arguments.settings.iter();
     let mut paths = paths.filter_map(|setting| setting.strip_prefix(TELEMETRY));
     paths.next_back().map(Path::new)
 }
 
-/// When a regular file was written last.
+/// Modification time of a regular file.
 fn written(file: &Path) -> Option<SystemTime> {
     let metadata = std::fs::metadata(file).ok()?;
     metadata.modified().ok().filter(|_| metadata.is_file())
 }
 
-/// A complete run leaves its telemetry with its end. Of a pipe or a device nothing can be read again.
+/// Checks that a complete run has written complete telemetry. A pipe or a device cannot be read again.
 fn check_telemetry(file: &Path, before: Option<SystemTime>) -> anyhow::Result<()> {
     let name = file.display();
     if file.exists() && !file.is_file() {
@@ -156,21 +156,21 @@ fn check_telemetry(file: &Path, before: Option<SystemTime>) -> anyhow::Result<()
     let trailer = Recording::last_trailer(file).with_context(|| name.to_string())?;
     ensure!(
         trailer.exit_code == 0,
-        "the run ended with exit code 0, but its telemetry {name} says {}; run it again",
+        "the run ended with exit code 0, but its telemetry {name} reports exit code {}; run it again",
         trailer.exit_code
     );
     Ok(())
 }
 
-/// The firmware overwrites what is there without asking, so it is asked here.
+/// The firmware overwrites an existing file, so it is checked here.
 fn check_destination(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(file) = telemetry(arguments) {
         let image = ("the image", arguments.image.as_path());
         let outputs = check([image], [Some(("telemetry", file))], arguments.force)
-            .context("nothing was run; --force goes before the image")?;
+            .context("the image was not run; put --force before the image")?;
         ensure!(
             !outputs.data_on_stdout() && !file.to_string_lossy().starts_with(':'),
-            "telemetry={}: it would get among the log; give the name of a file",
+            "telemetry={}: standard output has the log; give the name of a file",
             file.display()
         );
     }

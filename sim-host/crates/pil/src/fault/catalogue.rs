@@ -1,4 +1,4 @@
-//! What can be done to the loop, as data.
+//! Faults of the loop, as data.
 
 use dynamics::words::counted;
 use shared_model::gate::Limits;
@@ -24,7 +24,7 @@ listed! {
 }
 
 impl Signal {
-    /// Its place in a measurement.
+    /// Its field in a measurement.
     pub fn of(self, measurement: &mut Measurement<f32>) -> &mut f32 {
         match self {
             Self::WheelSpeed => &mut measurement.wheel_speed_rpm,
@@ -35,7 +35,7 @@ impl Signal {
         }
     }
 
-    /// Greatest magnitude that the gate lets through, in its unit.
+    /// Greatest magnitude that the gate accepts, in the signal's unit.
     pub fn range(self, limits: &Limits<f64>) -> f64 {
         match self {
             Self::WheelSpeed => limits.wheel_speed_rpm,
@@ -47,7 +47,7 @@ impl Signal {
     }
 }
 
-/// How one sensor fails. Shares are of the signal's range.
+/// Failure of a sensor. Shares are relative to the signal's range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SensorFailure {
     /// Not a number.
@@ -60,17 +60,17 @@ pub enum SensorFailure {
     OutOfRange,
     /// Keeps its last value.
     Stuck,
-    /// Jumps by this share and keeps that value.
+    /// Steps by this share and keeps that value.
     Step(f32),
-    /// Is off by this share.
+    /// Has a constant error of this share.
     Offset(f32),
-    /// Is off by ever more: this share a second.
+    /// Has an error that increases by this share per second.
     Drift(f32),
     /// Zero.
     DropOut,
 }
 
-/// How a link fails, for as many frames as the fault lasts.
+/// Failure of a link, for each frame while the fault lasts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkFailure {
     /// This bit is flipped.
@@ -78,78 +78,78 @@ pub enum LinkFailure {
         /// Number of the bit.
         bit: u16,
     },
-    /// The last frame before the fault comes again.
+    /// The last frame before the fault is repeated.
     Repetition,
-    /// No frame comes.
+    /// Frames are lost.
     Loss,
-    /// Frames come this many control ticks late.
+    /// Frames are late by this number of control ticks.
     Delay {
         /// Control ticks.
         ticks: usize,
     },
-    /// An old frame comes in place of the new one.
+    /// An old frame replaces the new one.
     Insertion {
         /// Its age, control ticks.
         age_ticks: usize,
     },
-    /// Another sender's frame comes: whole, but with another data ID.
+    /// A frame of another sender: intact, but with another data ID.
     Masquerade,
-    /// Whole frames whose counter is ahead by this.
+    /// Intact frames whose counter is ahead by this.
     WrongSequence {
         /// Counts.
         ahead: u8,
     },
 }
 
-/// How the servo fails.
+/// Failure of the servo.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ServoFailure {
-    /// The duty stays as it is.
+    /// The duty is constant.
     Stuck,
     /// The duty is at an end of its range.
     Saturated {
-        /// The upper one.
+        /// The upper end.
         high: bool,
     },
-    /// The dither comes this many PWM periods late.
+    /// The dither is late by this number of PWM periods.
     DitherPhase {
         /// PWM periods.
         periods: usize,
     },
     /// The dither is inverted.
     DitherInverted,
-    /// The dither is held over this many PWM periods: another frequency.
+    /// The dither is held over this number of PWM periods: another frequency.
     DitherFrequency {
         /// PWM periods.
         held: u32,
     },
-    /// The duty is off by these counts.
+    /// The duty has a constant error.
     Offset {
         /// Counts.
         counts: i16,
     },
 }
 
-/// How the ECU's interrupts or its clock fail.
+/// Failure of the ECU's interrupts or its clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimingFailure {
-    /// This many PWM interrupts in a row do not come.
+    /// This number of consecutive PWM interrupts is missed.
     MissedPwm(u32),
-    /// This many PWM interrupts in a row come twice.
+    /// This number of consecutive PWM interrupts is executed twice.
     DoublePwm(u32),
-    /// The control interrupt does not come.
+    /// The control interrupt is missed.
     MissedControl,
-    /// The control interrupt comes twice.
+    /// The control interrupt is executed twice.
     DoubleControl,
-    /// The control task is done this many PWM periods late.
+    /// The control task finishes late by this number of PWM periods.
     Overrun(u32),
-    /// The independent clock runs at this ratio.
+    /// The independent clock runs at this ratio of its rate.
     Clock(f64),
-    /// The processor starts again.
+    /// The processor restarts.
     Reset,
 }
 
-/// What is done.
+/// Kind of fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// A sensor fails.
@@ -160,16 +160,16 @@ pub enum Kind {
     SensorLink(LinkFailure),
     /// The link to the vehicle fails.
     ActuatorLink(LinkFailure),
-    /// The servo fails, and its pin shows it.
+    /// The servo fails, and its readback shows it.
     Servo(ServoFailure),
-    /// The servo fails behind the pin that is read back.
+    /// The servo fails after the pin that is read back.
     ServoBehindReadback(ServoFailure),
     /// Interrupts or clock fail.
     Timing(TimingFailure),
 }
 
 impl Kind {
-    /// Its name without what it is done to and how much.
+    /// Its name without location and extent.
     pub fn name(self) -> &'static str {
         match self {
             Self::Sensor(_, failure) => failure.name(),
@@ -185,7 +185,7 @@ impl Kind {
                 LinkFailure::WrongSequence { .. } => "actuator frame out of sequence",
             },
             Self::Servo(failure) => failure.name(),
-            Self::ServoBehindReadback(_) => "servo, read back right",
+            Self::ServoBehindReadback(_) => "servo, correct readback",
             Self::Timing(failure) => failure.name(),
         }
     }
@@ -248,13 +248,13 @@ impl TimingFailure {
 }
 
 listed! {
-    /// Class of faults, as the totals are told by.
+    /// Class of faults, by which the totals are reported.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
     #[serde(rename_all = "lowercase")]
     pub enum Class {
-        /// What a sensor tells.
+        /// Sensor values.
         Sensor => "sensor",
-        /// Frames on their way.
+        /// Frames between vehicle and ECU.
         Link => "link",
         /// Interrupts and clock.
         Timing => "timing",
@@ -267,12 +267,12 @@ listed! {
     }
 }
 
-/// A fault and how long it lasts.
+/// A fault and its duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fault {
-    /// What is done.
+    /// Kind of fault.
     pub kind: Kind,
-    /// For how many control ticks; `None` for good. Faults of timing last as long as their kind says.
+    /// Duration in control ticks; `None` if permanent. The kind of a timing fault gives its duration.
     pub ticks: Option<u32>,
 }
 
@@ -298,7 +298,7 @@ impl fmt::Display for Fault {
             Kind::ActuatorLink(failure) => write!(f, "actuator frame: {failure}"),
             Kind::Servo(failure) => write!(f, "servo: {failure}"),
             Kind::ServoBehindReadback(failure) => {
-                write!(f, "servo, read back right: {failure}")
+                write!(f, "servo, correct readback: {failure}")
             }
             Kind::Timing(failure) => write!(f, "{failure}"),
         }?;
@@ -333,7 +333,7 @@ impl fmt::Display for LinkFailure {
             Self::Repetition => write!(f, "repeated"),
             Self::Loss => write!(f, "lost"),
             Self::Delay { ticks } => write!(f, "late by {ticks}"),
-            Self::Insertion { age_ticks } => write!(f, "one of {} ago", counted(age_ticks, "tick")),
+            Self::Insertion { age_ticks } => write!(f, "{} old", counted(age_ticks, "tick")),
             Self::Masquerade => write!(f, "of another sender"),
             Self::WrongSequence { ahead } => write!(f, "counter ahead by {ahead}"),
         }
@@ -353,7 +353,7 @@ impl fmt::Display for ServoFailure {
             Self::DitherFrequency { held } => {
                 write!(f, "dither held over {}", counted(held, "period"))
             }
-            Self::Offset { counts } => write!(f, "duty off by {}", counted(counts, "count")),
+            Self::Offset { counts } => write!(f, "duty error of {}", counted(counts, "count")),
         }
     }
 }
@@ -372,7 +372,7 @@ impl fmt::Display for TimingFailure {
     }
 }
 
-/// Every fault that is injected between vehicle and ECU and into the ECU's timing.
+/// All faults between vehicle and ECU and in the ECU's timing.
 pub fn all() -> Vec<Fault> {
     let mut faults = sensors();
     faults.extend(links());
@@ -502,7 +502,7 @@ mod tests {
     use std::collections::HashSet;
 
     #[test]
-    fn every_fault_has_a_name_of_its_own() {
+    fn fault_names_are_unique() {
         let names: Vec<String> = all().iter().map(ToString::to_string).collect();
         let distinct: HashSet<&String> = names.iter().collect();
         assert_eq!(distinct.len(), names.len());

@@ -1,24 +1,24 @@
-//! Faults by manoeuvres: what became of them, and how late the last of each kind was found.
+//! Matrix of faults by manoeuvres: shares of the verdicts and worst latency.
 
-use crate::fault::campaign::Row;
-use crate::fault::judge::Verdict;
+use super::judge::Verdict;
+use super::row::Row;
 use plot::canvas::{Anchor, Area, Colour, TextStyle};
 use plot::figure::{Sample, figure};
 use plot::style::{FAINT_INK, INK, TEXT_FONT, TICK_FONT, WIDTH, text_width};
 use plot::text::wrap;
 
-/// Room left of the matrix, above it and right of it.
+/// Margins of the matrix: left, top and right.
 const LEFT: i32 = 450;
 const TOP: i32 = 190;
 const RIGHT: i32 = 16;
 const CELL_HEIGHT: i32 = 36;
 const GAP: i32 = 3;
 const NUMBER_WIDTH: i32 = 24;
-/// Height of a column's head: with it the longest word of a manoeuvre's name is no wider than a column.
+/// Font size of a column's heading: the longest word of a manoeuvre's name fits the column.
 const HEAD_FONT: u32 = 22;
 const LINE_STEP: i32 = 28;
 
-/// What became of faults, from dark to light, and the colour of text on it.
+/// Verdicts from dark to light, and the colour of text on each shade.
 const SHADES: [(Verdict, &str, Colour, Colour); 4] = [
     (
         Verdict::Detected,
@@ -33,35 +33,35 @@ const SHADES: [(Verdict, &str, Colour, Colour); 4] = [
         BLACK,
     ),
     (
-        Verdict::Silent,
-        "silent, on the list of those that may be",
+        Verdict::Undetected,
+        "undetected, with waiver",
         Colour(0xf0, 0xb8, 0x5a),
         BLACK,
     ),
     (
-        Verdict::Harmless,
-        "harmless",
+        Verdict::NoEffect,
+        "no effect",
         Colour(0xe6, 0xe8, 0xe6),
         BLACK,
     ),
 ];
 const WHITE: Colour = Colour(0xff, 0xff, 0xff);
 const BLACK: Colour = Colour(0, 0, 0);
-/// Silent and not on the list.
-const UNLISTED: Colour = Colour(0xc0, 0x10, 0x10);
+/// Undetected and without waiver.
+const FAILURE: Colour = Colour(0xc0, 0x10, 0x10);
 
 /// The matrix of all kinds of faults by all manoeuvres, as an SVG document.
 pub fn draw(rows: &[Row]) -> String {
-    let kinds = distinct(rows.iter().map(|row| row.kind.as_str()));
+    let kinds = distinct(rows.iter().map(|row| row.kind));
     let manoeuvres = distinct(rows.iter().map(|row| row.manoeuvre.as_str()));
-    let heading = "Faults by manoeuvre: shares of what became of them; number: worst latency, control ticks (1 ms)";
+    let heading = "Verdicts by fault and manoeuvre; number: worst latency, ticks of 1 ms";
     let height = TOP + CELL_HEIGHT * kinds.len() as i32 + RIGHT;
     let mut legend: Vec<_> = SHADES
         .iter()
         .map(|(_, name, shade, _)| ((*name).to_owned(), Sample::Shade(*shade)))
         .collect();
-    if rows.iter().any(Row::is_unlisted) {
-        legend.push(("silent, not on it".into(), Sample::Shade(UNLISTED)));
+    if rows.iter().any(Row::is_failure) {
+        legend.push(("undetected, without waiver".into(), Sample::Shade(FAILURE)));
     }
     figure(heading, &legend, height, |area| {
         let width = column_width(manoeuvres.len());
@@ -111,14 +111,14 @@ fn names(area: &Area, kinds: &[&str], manoeuvres: &[&str], width: i32) {
     area.text("kind of fault \u{2193}", (LEFT - 190, TOP - 20), axes);
 }
 
-/// A manoeuvre's name in lines that are no wider than its column.
+/// A manoeuvre's name, wrapped to the width of its column.
 fn head(manoeuvre: &str, width: i32) -> Vec<String> {
     let letters = "abcdefghijklmnopqrstuvwxyz";
     let fitting = width * letters.len() as i32 / text_width(letters, HEAD_FONT);
     wrap(manoeuvre, fitting as usize)
 }
 
-/// The shares of the verdicts side by side, and the worst latency on the first.
+/// Shares of the verdicts from left to right, with the worst latency on the first.
 fn cell(area: &Area, (left, top): (i32, i32), width: i32, rows: &[&Row]) {
     if rows.is_empty() {
         return;
@@ -126,17 +126,17 @@ fn cell(area: &Area, (left, top): (i32, i32), width: i32, rows: &[&Row]) {
     let usable = f64::from(width - GAP);
     let place = |count: usize| left + (usable * count as f64 / rows.len() as f64).round() as i32;
     let mut before = 0;
-    let unlisted = rows.iter().filter(|row| row.is_unlisted()).count();
+    let failures = rows.iter().filter(|row| row.is_failure()).count();
     let mut ink = None;
     let listed = SHADES.iter().map(|(verdict, _, shade, on_it)| {
-        let is_it = |row: &&&Row| row.verdict == *verdict && !row.is_unlisted();
+        let is_it = |row: &&&Row| row.verdict == *verdict && !row.is_failure();
         (rows.iter().filter(is_it).count(), *shade, *on_it)
     });
-    for (count, shade, on_it) in [(unlisted, UNLISTED, WHITE)].into_iter().chain(listed) {
+    for (count, shade, on_it) in [(failures, FAILURE, WHITE)].into_iter().chain(listed) {
         if count == 0 {
             continue;
         }
-        // Of the shade on which most of the number stands.
+        // The colour for the shade under most of the number.
         if place(before + count) > left + NUMBER_WIDTH {
             ink.get_or_insert(on_it);
         }
@@ -160,9 +160,9 @@ mod tests {
     use crate::fault::manoeuvres;
 
     #[test]
-    fn heads_keep_to_their_columns_and_words_are_whole() {
+    fn headings_fit_their_columns_and_words_are_not_split() {
         let manoeuvres = manoeuvres::all().unwrap();
-        // One more is the processor's.
+        // The processor has an additional column.
         let width = column_width(manoeuvres.len() + 1);
         for (_, manoeuvre) in &manoeuvres {
             let lines = head(&manoeuvre.name, width);

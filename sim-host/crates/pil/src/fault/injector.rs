@@ -1,4 +1,4 @@
-//! Faults of sensors, links and servo, done to what passes between vehicle and ECU.
+//! Faults of sensors, links and servo, injected between vehicle and ECU.
 
 use super::catalogue::{Fault, Kind, LinkFailure, SensorFailure, ServoFailure};
 use crate::disturbance::{Disturbance, DutyCodes};
@@ -11,29 +11,29 @@ use shared_model::servo::Pwm;
 use shared_model::signal::Measurement;
 use std::collections::VecDeque;
 
-/// Frames that are kept to be sent again: a counter's whole round, and one more.
+/// Frames kept for repetition: one more than the period of the counter.
 const KEPT_FRAMES: usize = 257;
-/// Duties that are kept: more than a period of the slowest dither.
+/// Duties kept: more than one period of the slowest dither.
 const KEPT_DUTIES: usize = 40;
 
-/// Lets everything pass, and does a fault from the moment on that it is told to.
+/// Passes all signals unchanged until a fault begins.
 #[derive(Debug, Clone)]
 pub struct Injector {
     limits: Limits<f64>,
     control_period_s: f32,
     fault: Option<Fault>,
-    /// Control ticks for which the fault has been on.
+    /// Control ticks since the fault began.
     ticks: u32,
     /// The last measurement before the fault.
     last: Option<Measurement<f32>>,
     sensor_link: Link,
     actuator_link: Link,
     servo: Servo,
-    was_wrong: bool,
+    was_changed: bool,
 }
 
 impl Injector {
-    /// In a loop of that scenario.
+    /// For a loop of that scenario.
     pub fn new(scenario: &Scenario<f64>) -> Self {
         let neutral = Pwm::new(&scenario.servo, scenario.run.pwm_rate_hz).neutral();
         Self {
@@ -45,18 +45,18 @@ impl Injector {
             sensor_link: Link::new(SENSOR_DATA_ID, ACTUATOR_DATA_ID),
             actuator_link: Link::new(ACTUATOR_DATA_ID, SENSOR_DATA_ID),
             servo: Servo::new(neutral.period()),
-            was_wrong: false,
+            was_changed: false,
         }
     }
 
-    /// From now on the fault is there. Call right behind a control tick.
+    /// Begins a fault. Call directly after a control tick.
     pub fn begin(&mut self, fault: Fault) {
         self.fault = Some(fault);
     }
 
-    /// A sensor's value that lasts was not what the sensor told, or the servo not driven with what the ECU put out.
-    pub fn stays_wrong(&self) -> bool {
-        self.was_wrong && self.fault.is_some_and(|fault| fault.ticks.is_none())
+    /// Whether a permanent fault changed a sensor value or the duty of the servo.
+    pub fn is_value_corrupted(&self) -> bool {
+        self.was_changed && self.fault.is_some_and(|fault| fault.ticks.is_none())
     }
 
     fn active(&self) -> Option<Kind> {
@@ -81,29 +81,29 @@ impl Disturbance for Injector {
             Some(Kind::ServoBehindReadback(failure)) => (self.servo.fail(failure, code), false),
             _ => (self.servo.pass(code), true),
         };
-        self.was_wrong |= driven != code;
+        self.was_changed |= driven != code;
         let captured = if is_seen { driven } else { code };
         DutyCodes { driven, captured }
     }
 
-    fn measurement(&mut self, told: Measurement<f32>) -> Measurement<f32> {
-        let mut changed = told;
+    fn measurement(&mut self, measured: Measurement<f32>) -> Measurement<f32> {
+        let mut changed = measured;
         match self.active() {
             Some(Kind::Sensor(signal, failure)) => {
-                let mut last = self.last.unwrap_or(told);
+                let mut last = self.last.unwrap_or(measured);
                 let value = signal.of(&mut changed);
                 let range = signal.range(&self.limits) as f32;
                 let since_s = self.ticks as f32 * self.control_period_s;
                 *value = failed(failure, *value, *signal.of(&mut last), range, since_s);
             }
             Some(Kind::Swapped(a, b)) => {
-                let mut told = told;
-                *a.of(&mut changed) = *b.of(&mut told);
-                *b.of(&mut changed) = *a.of(&mut told);
+                let mut measured = measured;
+                *a.of(&mut changed) = *b.of(&mut measured);
+                *b.of(&mut changed) = *a.of(&mut measured);
             }
-            _ => self.last = Some(told),
+            _ => self.last = Some(measured),
         }
-        self.was_wrong |= changed != told;
+        self.was_changed |= changed != measured;
         changed
     }
 
@@ -119,7 +119,7 @@ impl Disturbance for Injector {
     }
 }
 
-/// What a failed sensor tells in place of `value`.
+/// Output of a failed sensor in place of `value`.
 fn failed(failure: SensorFailure, value: f32, last: f32, range: f32, since_s: f32) -> f32 {
     match failure {
         SensorFailure::NotANumber => f32::NAN,
@@ -134,14 +134,14 @@ fn failed(failure: SensorFailure, value: f32, last: f32, range: f32, since_s: f3
     }
 }
 
-/// A link and what it has carried.
+/// A link and its past frames.
 #[derive(Debug, Clone)]
 struct Link {
     data_id: u16,
     other_data_id: u16,
-    /// Frames that came before the fault, the newest last.
+    /// Frames before the fault, the newest last.
     seen: VecDeque<FrameBytes>,
-    /// Frames on their way.
+    /// Delayed frames.
     late: VecDeque<FrameBytes>,
 }
 
@@ -201,15 +201,15 @@ fn protected(mut frame: FrameBytes, data_id: u16, counter: u8) -> FrameBytes {
     frame
 }
 
-/// A servo and the duties that it was driven with.
+/// A servo and its past duties.
 #[derive(Debug, Clone)]
 struct Servo {
     period: u16,
     /// Duty codes, the newest last.
     codes: VecDeque<u16>,
-    /// What it was driven with last.
+    /// The last duty.
     driven: u16,
-    /// PWM periods for which it has been driven with that.
+    /// PWM periods for which that duty has been held.
     held: u32,
 }
 
@@ -258,7 +258,7 @@ impl Servo {
         driven
     }
 
-    /// The code mirrored at the mean of the dither's last whole period or so.
+    /// The code mirrored at the mean of the extremes of the kept duties.
     fn mirrored(&self, code: u16) -> u16 {
         let low = self.codes.iter().min().copied().unwrap_or(code);
         let high = self.codes.iter().max().copied().unwrap_or(code);

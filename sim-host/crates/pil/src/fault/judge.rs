@@ -1,6 +1,6 @@
-//! Was a fault found, when, and what came of it? Every run is held against its clean twin.
+//! Classification of a fault: every run is compared with its fault-free run.
 
-use super::super::drive::Drive;
+use crate::vehicle_node::VehicleNode;
 use serde::Serialize;
 use shared_model::e2e::Status;
 use shared_model::exchange::Packet;
@@ -17,20 +17,20 @@ const WARNINGS: [&str; 5] = [
     "frames lost",
 ];
 
-/// Who found a fault.
+/// The part of the loop that detected a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Finder {
+pub enum Detector {
     /// The ECU's gate, with these faults.
     Gate(Faults),
-    /// The ECU, with these bits of warnings.
+    /// The ECU, with these warning bits.
     Warning(u16),
-    /// The vehicle, by an actuator frame that it did not get as it should.
+    /// The vehicle, by its check of an actuator frame.
     Vehicle(Status),
-    /// The firmware ended with this code, its PWM neutral.
+    /// The firmware ended with this exit code, its PWM neutral.
     Firmware(i32),
 }
 
-impl Finder {
+impl Detector {
     /// In words.
     pub fn describe(self) -> String {
         match self {
@@ -50,26 +50,26 @@ impl Finder {
     }
 }
 
-/// The first word of a fault.
+/// The first detection of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Finding {
-    /// Who found it.
-    pub finder: Finder,
-    /// Control ticks from the injection to the one that found it. The ECU's frame that says so leaves one later.
+pub struct Detection {
+    /// The detector.
+    pub detector: Detector,
+    /// Control ticks from the injection to the detection. The ECU's frame that reports it is sent one tick later.
     pub latency_ticks: u32,
 }
 
-/// What came of a fault.
+/// The reaction to a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reaction {
-    /// Nothing.
+    /// None.
     None,
-    /// It was said, and the ECU goes on.
+    /// The fault was reported, and the ECU continued.
     Tolerated,
-    /// The ECU's safe state.
+    /// The ECU entered its safe state.
     SafeState,
-    /// The ECU started again.
+    /// The ECU restarted.
     Restart,
     /// The firmware ended, its PWM neutral.
     Ended,
@@ -88,35 +88,35 @@ impl Reaction {
     }
 }
 
-/// How a fault is judged.
+/// The class of an outcome.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Trajectory, and the servo brought to neutral or the ECU started again.
+    /// Detected: the servo was brought to neutral, or the ECU restarted.
     Detected,
-    /// Trajectory, and gone on.
+    /// Detected, and the ECU continued.
     Tolerated,
-    /// Not found; the ECU commands what it would have without, bit for bit, and works on no wrong value.
-    Harmless,
-    /// Not found, and the ECU commands something else or works on a wrong value.
-    Silent,
+    /// No diagnostic is raised. All outputs are bit-identical to the fault-free run, and no corrupted value is live.
+    NoEffect,
+    /// No diagnostic is raised, but an output differs or a corrupted value is live.
+    Undetected,
 }
 
-/// Greatest angles of the vehicle over a time.
+/// Greatest angles of the vehicle in an interval.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Peaks {
     /// Greatest magnitude of the front steering angle, rad.
     pub steering_angle_rad: f64,
-    /// Greatest magnitude of the front tyres' slip angle, rad.
+    /// Greatest magnitude of the slip angle of the front tyres, rad.
     pub front_slip_angle_rad: f64,
 }
 
 impl Peaks {
-    /// The vehicle's angles now.
-    pub fn of(drive: &Drive) -> Self {
+    /// The present angles of the vehicle.
+    pub fn of(vehicle: &VehicleNode) -> Self {
         Self {
-            steering_angle_rad: drive.plant().truth().steering_angle_rad.abs(),
-            front_slip_angle_rad: drive.plant().front_slip_angle_rad().abs(),
+            steering_angle_rad: vehicle.plant().truth().steering_angle_rad.abs(),
+            front_slip_angle_rad: vehicle.plant().front_slip_angle_rad().abs(),
         }
     }
 
@@ -129,79 +129,80 @@ impl Peaks {
     }
 }
 
-/// What became of a fault.
+/// The outcome of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
-    /// How it is judged.
+    /// The verdict.
     pub verdict: Verdict,
-    /// Who found it, if anybody did.
-    pub finding: Option<Finding>,
-    /// What the ECU did.
+    /// The first detection, if any.
+    pub detection: Option<Detection>,
+    /// Reaction of the ECU.
     pub reaction: Reaction,
-    /// The vehicle's greatest angles from the injection on.
+    /// Greatest angles of the vehicle from the injection on.
     pub peaks: Peaks,
 }
 
-/// Watches a run from the injection on.
+/// Observes a run from the injection on.
 #[derive(Debug, Clone)]
 pub struct Judge {
-    periods_a_tick: u32,
+    periods_per_tick: u32,
     injected_tick: u32,
-    finding: Option<Finding>,
+    detection: Option<Detection>,
     reaction: Reaction,
     differs: bool,
     peaks: Peaks,
 }
 
 impl Judge {
-    /// Of a run whose fault begins behind that control tick.
-    pub fn new(periods_a_tick: u32, injected_tick: u32) -> Self {
+    /// For a fault that begins after that control tick.
+    pub fn new(periods_per_tick: u32, injected_tick: u32) -> Self {
         Self {
-            periods_a_tick,
+            periods_per_tick,
             injected_tick,
-            finding: None,
+            detection: None,
             reaction: Reaction::None,
             differs: false,
             peaks: Peaks::default(),
         }
     }
 
-    /// Looks at a PWM period that is over: what the ECU put out, what it put out in the clean twin, and the vehicle.
-    pub fn look(&mut self, from_ecu: &Packet, clean: &Packet, drive: &Drive) {
-        self.differs |= from_ecu.duty_code != clean.duty_code;
-        let (now, then) = (actuation(from_ecu), actuation(clean));
-        self.differs |= commands(now.as_ref()) != commands(then.as_ref());
-        let tick = drive.periods() / self.periods_a_tick;
-        if let Some(told) = now {
-            self.listen(&told, tick.saturating_sub(1));
+    /// Observes a completed PWM period: the ECU's packet, its packet in the fault-free run, and the vehicle.
+    pub fn observe(&mut self, from_ecu: &Packet, fault_free: &Packet, vehicle: &VehicleNode) {
+        self.differs |= from_ecu.duty_code != fault_free.duty_code;
+        let (now, expected) = (actuation(from_ecu), actuation(fault_free));
+        self.differs |= commands(now.as_ref()) != commands(expected.as_ref());
+        let tick = vehicle.periods() / self.periods_per_tick;
+        if let Some(actuation) = now {
+            self.check(&actuation, tick.saturating_sub(1));
         }
-        if drive.periods().is_multiple_of(self.periods_a_tick) {
-            self.peaks = self.peaks.or(Peaks::of(drive));
+        if vehicle.periods().is_multiple_of(self.periods_per_tick) {
+            self.peaks = self.peaks.or(Peaks::of(vehicle));
         }
-        let status = drive.frame_status();
+        let status = vehicle.frame_status();
         if status != Status::Ok {
-            self.found(Finder::Vehicle(status), tick, Reaction::Tolerated);
+            self.detect(Detector::Vehicle(status), tick, Reaction::Tolerated);
         }
     }
 
-    fn listen(&mut self, told: &Actuation<f32>, tick: u32) {
-        if told.faults != 0 {
-            let finder = Finder::Gate(Faults::from_bits(told.faults));
-            self.found(finder, tick, Reaction::SafeState);
+    fn check(&mut self, actuation: &Actuation<f32>, tick: u32) {
+        if actuation.faults != 0 {
+            let detector = Detector::Gate(Faults::from_bits(actuation.faults));
+            self.detect(detector, tick, Reaction::SafeState);
         }
-        if told.warnings != 0 {
-            self.found(Finder::Warning(told.warnings), tick, Reaction::Tolerated);
+        if actuation.warnings != 0 {
+            let detector = Detector::Warning(actuation.warnings);
+            self.detect(detector, tick, Reaction::Tolerated);
         }
-        if told.mode == Mode::Starting {
-            let finder = Finder::Vehicle(Status::WrongSequence);
-            self.found(finder, tick + 1, Reaction::Restart);
+        if actuation.mode == Mode::Starting {
+            let detector = Detector::Vehicle(Status::WrongSequence);
+            self.detect(detector, tick + 1, Reaction::Restart);
         }
     }
 
-    fn found(&mut self, finder: Finder, tick: u32, reaction: Reaction) {
+    fn detect(&mut self, detector: Detector, tick: u32, reaction: Reaction) {
         let latency_ticks = tick.saturating_sub(self.injected_tick);
-        self.finding.get_or_insert(Finding {
-            finder,
+        self.detection.get_or_insert(Detection {
+            detector,
             latency_ticks,
         });
         if matches!(self.reaction, Reaction::None | Reaction::Tolerated) {
@@ -209,33 +210,33 @@ impl Judge {
         }
     }
 
-    /// The firmware has ended with an exit code, before the vehicle's next PWM period.
-    pub fn ended(&mut self, exit_code: i32, drive: &Drive) {
-        let tick = drive.periods().div_ceil(self.periods_a_tick);
+    /// The firmware ended with an exit code before the vehicle's next PWM period.
+    pub fn ended(&mut self, exit_code: i32, vehicle: &VehicleNode) {
+        let tick = vehicle.periods().div_ceil(self.periods_per_tick);
         self.reaction = Reaction::None;
-        self.found(Finder::Firmware(exit_code), tick, Reaction::Ended);
+        self.detect(Detector::Firmware(exit_code), tick, Reaction::Ended);
     }
 
-    /// The ECU puts out nothing any more: the vehicle misses its frames, the servo keeps its last duty.
-    pub fn fell_silent(&mut self) {
-        self.found(
-            Finder::Vehicle(Status::NoNewData),
+    /// The ECU stopped sending: the vehicle misses its frames, and the servo keeps its last duty.
+    pub fn timed_out(&mut self) {
+        self.detect(
+            Detector::Vehicle(Status::NoNewData),
             self.injected_tick + 1,
             Reaction::Tolerated,
         );
     }
 
-    /// What became of the fault; `stays_wrong` if a wrong value is in use.
-    pub fn conclude(&self, stays_wrong: bool) -> Outcome {
+    /// The outcome; `is_value_corrupted` if a corrupted value is still in use.
+    pub fn outcome(&self, is_value_corrupted: bool) -> Outcome {
         let verdict = match self.reaction {
             Reaction::SafeState | Reaction::Restart | Reaction::Ended => Verdict::Detected,
             Reaction::Tolerated => Verdict::Tolerated,
-            Reaction::None if self.differs || stays_wrong => Verdict::Silent,
-            Reaction::None => Verdict::Harmless,
+            Reaction::None if self.differs || is_value_corrupted => Verdict::Undetected,
+            Reaction::None => Verdict::NoEffect,
         };
         Outcome {
             verdict,
-            finding: self.finding,
+            detection: self.detection,
             reaction: self.reaction,
             peaks: self.peaks,
         }
@@ -247,12 +248,12 @@ fn actuation(packet: &Packet) -> Option<Actuation<f32>> {
 }
 
 fn commands(actuation: Option<&Actuation<f32>>) -> Option<(Mode, u32, u32, u32)> {
-    actuation.map(|told| {
+    actuation.map(|actuation| {
         (
-            told.mode,
-            told.motor_voltage_v.to_bits(),
-            told.dither_amplitude_v.to_bits(),
-            told.wheel_speed_limit_rpm.to_bits(),
+            actuation.mode,
+            actuation.motor_voltage_v.to_bits(),
+            actuation.dither_amplitude_v.to_bits(),
+            actuation.wheel_speed_limit_rpm.to_bits(),
         )
     })
 }

@@ -28,7 +28,7 @@ const FILES: [&str; 7] = [
 /// All manoeuvres, each with its scenario.
 ///
 /// # Errors
-/// If one of the files is not valid.
+/// If one of the files is invalid.
 pub fn all() -> Result<Vec<(Scenario<f64>, Manoeuvre)>, ManoeuvreError> {
     FILES.into_iter().map(manoeuvre::from_text).collect()
 }

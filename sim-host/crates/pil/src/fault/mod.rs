@@ -1,23 +1,27 @@
-//! Faults on purpose: what is done to the loop, whether the ECU or the vehicle finds it, and what the vehicle does then.
+//! Fault injection: faults are injected into the loop, and every run is compared with its fault-free run.
 //!
 //! | question | module |
 //! |---|---|
-//! | what can be done? | [`catalogue`] |
-//! | how is it done to what passes between vehicle and ECU? | [`injector`] |
-//! | how to the ECU's interrupts? | [`tasks`] |
-//! | how to the memory and the core of the ECU on its processor? | [`processor`], [`memory`] |
-//! | was it found, when, and what came of it? | [`judge`] |
-//! | which faults may stay unfound, and why? | [`accepted`] |
-//! | all of them, on all manoeuvres | [`campaign`] |
-//! | how are they drawn? | [`figure`] |
+//! | which faults are injected? | [`catalogue`], [`processor_fault`], [`memory`], [`injection`] |
+//! | how do they act on the signals between vehicle and ECU? | [`injector`] |
+//! | how do they act on the ECU's interrupts? | [`tasks`] |
+//! | how do they act on the processor of the firmware? | [`processor`] |
+//! | is a fault detected, after how many ticks, and what is the reaction? | [`judge`] |
+//! | which faults may stay undetected, and why? | [`waivers`] |
+//! | how are faults injected on all [`manoeuvres`], with the ECU's program on the host? | [`host`] |
+//! | how is a campaign reported? | [`row`], [`totals`], [`figure`] |
 
-pub mod accepted;
-pub mod campaign;
 pub mod catalogue;
 pub mod figure;
+pub mod host;
+pub mod injection;
 pub mod injector;
 pub mod judge;
 pub mod manoeuvres;
 pub mod memory;
 pub mod processor;
+pub mod processor_fault;
+pub mod row;
 pub mod tasks;
+pub mod totals;
+pub mod waivers;

@@ -1,18 +1,18 @@
-//! The ECU's program on the host with its two tasks as the firmware's interrupts run them, so that an interrupt can fail.
+//! The ECU's program on the host. Its two tasks are scheduled as by the firmware's interrupts, which can fail.
 
 use super::catalogue::TimingFailure;
 use shared_model::ecu::{ControlInput, ControlOutput, ControlTask, Ecu, PwmTask};
 use shared_model::exchange::{FrameBytes, Packet};
 use shared_model::{InvalidScenario, Scenario};
 
-/// Counts a second of the independent clock.
+/// Rate of the independent clock, Hz.
 const CLOCK_HZ: u32 = 25_000_000;
 
-/// A control task that is not done yet.
+/// An unfinished control task.
 #[derive(Debug, Clone)]
 struct Pending {
     input: ControlInput,
-    /// PWM periods till it is done; `None` if it never is.
+    /// PWM periods until it finishes; `None` if it never does.
     periods: Option<u32>,
 }
 
@@ -25,7 +25,7 @@ pub struct Tasks {
     output: Option<ControlOutput<f32>>,
     frame: Option<FrameBytes>,
     pending: Option<Pending>,
-    counts_a_period: f64,
+    counts_per_period: f64,
     clock_ratio: f64,
     counts: f64,
     counts_at_tick: f64,
@@ -37,7 +37,7 @@ impl Tasks {
     /// The program of a scenario.
     ///
     /// # Errors
-    /// If the scenario is not valid.
+    /// If the scenario is invalid.
     pub fn new(scenario: &Scenario<f32>) -> Result<Self, InvalidScenario> {
         let Ecu { pwm, control, .. } = Ecu::new(scenario, CLOCK_HZ)?;
         Ok(Self {
@@ -48,7 +48,7 @@ impl Tasks {
             output: None,
             frame: None,
             pending: None,
-            counts_a_period: f64::from(CLOCK_HZ) / f64::from(scenario.run.pwm_rate_hz),
+            counts_per_period: f64::from(CLOCK_HZ) / f64::from(scenario.run.pwm_rate_hz),
             clock_ratio: 1.0,
             counts: 0.0,
             counts_at_tick: 0.0,
@@ -56,7 +56,7 @@ impl Tasks {
         })
     }
 
-    /// From now on interrupts or clock fail. Call right behind a control tick.
+    /// Begins a failure of interrupts or clock. Call directly after a control tick.
     pub fn fail(&mut self, failure: TimingFailure) {
         match failure {
             TimingFailure::Clock(ratio) => self.clock_ratio = ratio,
@@ -69,7 +69,7 @@ impl Tasks {
 
     /// One PWM period; `answer` as for any ECU in the loop.
     pub fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) {
-        self.counts += self.counts_a_period * self.clock_ratio;
+        self.counts += self.counts_per_period * self.clock_ratio;
         match self.failure {
             Some(TimingFailure::MissedPwm(count)) => {
                 self.failure = (count > 1).then_some(TimingFailure::MissedPwm(count - 1));
@@ -97,7 +97,7 @@ impl Tasks {
         }
     }
 
-    /// A period without PWM interrupt: the servo keeps its duty, and a sensor frame waits.
+    /// A period without a PWM interrupt: the servo keeps its duty, and a sensor frame waits.
     fn miss(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) {
         let reply = answer(&Packet {
             duty_code: self.duty_code,
@@ -135,7 +135,7 @@ impl Tasks {
         self.counts_at_tick = self.counts;
         if let Some(late) = &mut self.pending {
             self.pwm.report_late_control();
-            // It is at work still, or is called now; either way on the newer input.
+            // It is still running or is called now; in both cases it takes the newer input.
             late.input = input;
             late.periods = late.periods.or(Some(0));
             return;

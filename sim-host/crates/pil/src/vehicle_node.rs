@@ -1,7 +1,7 @@
-//! A drive: the vehicle on its manoeuvre, answering an ECU once a PWM period.
+//! The vehicle as the node that answers the ECU once per PWM period: plant, sensors and frames.
 //!
-//! An ECU starts with a neutral servo and slews to the driver's request. So that this is over when the manoeuvre begins, the
-//! vehicle is held in its initial state meanwhile, its sensors on: the lead-in.
+//! An ECU starts with a neutral servo and slews to the driver's request. During this lead-in the vehicle is held in its initial
+//! state with its sensors on, so that the slew is complete when the manoeuvre begins.
 
 use super::disturbance::{Disturbance, Undisturbed};
 use super::manoeuvre::Manoeuvre;
@@ -17,17 +17,17 @@ use shared_model::frame::{
 use shared_model::servo::Duty;
 use shared_model::signal::Actuation;
 
-/// Control ticks of the lead-in beyond the slewing.
+/// Control ticks of the lead-in after the slew.
 const SPARE_TICKS: f64 = 20.0;
 
-/// Control ticks for which the vehicle is held while the ECU starts.
+/// Control ticks of the lead-in.
 fn lead_in_ticks(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u32 {
     let request_a = manoeuvre.current_request_at(0.0).abs();
     let slewing_s = request_a / scenario.policy.motor_slew_a_per_s;
     (slewing_s * scenario.run.control_rate_hz + SPARE_TICKS).ceil() as u32
 }
 
-/// The scenario as the ECU has it: its dither sets in later by the lead-in.
+/// The ECU's scenario: its dither starts later by the lead-in.
 pub fn ecu_scenario(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Scenario<f32> {
     let mut own = *scenario;
     let lead_in_ticks = f64::from(lead_in_ticks(scenario, manoeuvre));
@@ -35,15 +35,15 @@ pub fn ecu_scenario(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Scenario
     own.map(&|value| value as f32)
 }
 
-/// The vehicle's end of the exchange.
+/// The vehicle's node on the link.
 #[derive(Debug, Clone)]
-pub struct Drive {
+pub struct VehicleNode {
     plant: Plant,
     sensors: Sensors,
     sender: Sender,
     receiver: Receiver,
     period_counts: u16,
-    periods_a_tick: u32,
+    periods_per_tick: u32,
     /// PWM periods from the ECU's start.
     periods: u32,
     lead_in_periods: u32,
@@ -51,57 +51,61 @@ pub struct Drive {
     frame_status: Status,
 }
 
-impl Drive {
+impl VehicleNode {
     /// At the start of a manoeuvre.
     ///
     /// # Errors
-    /// If scenario or manoeuvre are not valid.
+    /// If the scenario or the manoeuvre is invalid.
     pub fn new(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Result<Self, InvalidPlant> {
         let plant = Plant::new(scenario, manoeuvre)?;
-        let periods_a_tick = scenario.periods_per_tick();
+        let periods_per_tick = scenario.periods_per_tick();
         Ok(Self {
             period_counts: plant.pwm().neutral().period(),
             plant,
             sensors: Sensors::new(&manoeuvre.sensors),
             sender: Sender::new(SENSOR_DATA_ID),
             receiver: Receiver::new(ACTUATOR_DATA_ID, MAX_DELTA_COUNTER),
-            periods_a_tick,
+            periods_per_tick,
             periods: 0,
-            lead_in_periods: periods_a_tick * lead_in_ticks(scenario, manoeuvre),
+            lead_in_periods: periods_per_tick * lead_in_ticks(scenario, manoeuvre),
             actuation: None,
             frame_status: Status::NoNewData,
         })
     }
 
-    /// Takes what the ECU put out for a period, moves through it, and answers with the duty on the servo's pin and, where a
-    /// control tick is due, a sensor frame.
+    /// Takes the ECU's packet for a period and integrates the plant over it. Answers with the duty on the servo's pin and, at a
+    /// control tick, a sensor frame.
     pub fn answer(&mut self, from_ecu: &Packet) -> Packet {
         self.answer_through(&mut Undisturbed, from_ecu)
     }
 
-    /// The same through what comes between vehicle and ECU.
-    pub fn answer_through(&mut self, between: &mut dyn Disturbance, from_ecu: &Packet) -> Packet {
+    /// The same, with a disturbance between vehicle and ECU.
+    pub fn answer_through(
+        &mut self,
+        disturbance: &mut dyn Disturbance,
+        from_ecu: &Packet,
+    ) -> Packet {
         self.periods += 1;
-        let is_tick = self.periods.is_multiple_of(self.periods_a_tick);
-        let frame = between.actuator_frame(from_ecu.frame);
+        let is_tick = self.periods.is_multiple_of(self.periods_per_tick);
+        let frame = disturbance.actuator_frame(from_ecu.frame);
         if is_tick || frame.is_some() {
             self.take(frame.as_ref());
         }
-        let codes = between.duty(from_ecu.duty_code);
-        // The servo's driver has no more counts than its period.
+        let codes = disturbance.duty(from_ecu.duty_code);
+        // The duty of the servo's driver cannot exceed its period.
         let [driven, captured] =
             [codes.driven, codes.captured].map(|code| code.min(self.period_counts));
-        let duty = Duty::new(driven, self.period_counts).expect("cut to the period above");
+        let duty = Duty::new(driven, self.period_counts).expect("clamped to the period above");
         if self.has_begun() {
             self.plant.step(duty);
         }
         let frame = is_tick.then(|| {
-            let told = self.sensors.sample(&self.plant.truth());
-            encode_measurement(&between.measurement(told), &mut self.sender)
+            let measured = self.sensors.sample(&self.plant.truth());
+            encode_measurement(&disturbance.measurement(measured), &mut self.sender)
         });
         Packet {
             duty_code: captured,
-            frame: between.sensor_frame(frame),
+            frame: disturbance.sensor_frame(frame),
         }
     }
 
@@ -122,17 +126,17 @@ impl Drive {
         self.lead_in_periods + self.plant.total_periods()
     }
 
-    /// The lead-in is over: the vehicle has moved.
+    /// Whether the lead-in is over.
     pub fn has_begun(&self) -> bool {
         self.periods > self.lead_in_periods
     }
 
-    /// What the ECU last told.
+    /// Content of the ECU's last valid frame.
     pub fn actuation(&self) -> Option<&Actuation<f32>> {
         self.actuation.as_ref()
     }
 
-    /// What the last check of an actuator frame found; one is due at every control tick.
+    /// Status of the last check of an actuator frame; one is due at every control tick.
     pub fn frame_status(&self) -> Status {
         self.frame_status
     }
@@ -147,7 +151,7 @@ impl Drive {
         &self.plant
     }
 
-    /// The present moment, for recording.
+    /// The present state, for recording.
     pub fn record(&self) -> Record {
         self.plant.record()
     }

@@ -1,10 +1,11 @@
-//! A manoeuvre at every level: model, software and processor in the loop, and whether they command the same.
+//! A manoeuvre as MIL, SIL and PIL (model, software and processor in the loop), and a comparison of their commands.
 
-use super::drive::{Drive, ecu_scenario};
+use super::closed_loop::{Exchange, Run, run};
+use super::comparison::{Comparison, Depth, compare};
 use super::ecu::{Model, Processor, Software};
 use super::manoeuvre::Manoeuvre;
 use super::plant::InvalidPlant;
-use super::run::{Comparison, Depth, Exchange, Run, compare, run};
+use super::vehicle_node::{VehicleNode, ecu_scenario};
 use image::Image;
 use qemu::session::{LinkKind, Session};
 use qemu::settings;
@@ -12,38 +13,40 @@ use qemu::{Machine, RunError, meaning};
 use shared_model::{InvalidScenario, Scenario};
 use std::time::{Duration, Instant};
 
-/// Where the processor in the loop is emulated.
+/// The emulated processor and its firmware.
 #[derive(Debug, Clone)]
 pub struct Target {
     /// The firmware.
     pub image: Image,
     /// The emulator's machine.
     pub machine: Machine,
-    /// What carries the exchange.
+    /// The link between emulator and host.
     pub link: LinkKind,
-    /// Longest time that the emulator may take for one answer.
+    /// Longest time for one answer of the emulator.
     pub time_out: Duration,
 }
 
-/// Why a manoeuvre could not be driven.
+/// An error of a run in the loop.
 #[derive(Debug, thiserror::Error)]
-pub enum LevelError {
-    /// Scenario or manoeuvre are not valid.
+pub enum LoopError {
+    /// The scenario or the manoeuvre is invalid.
     #[error(transparent)]
     Plant(#[from] InvalidPlant),
-    /// The scenario is not one that an ECU can run.
+    /// An ECU cannot run the scenario.
     #[error(transparent)]
     Scenario(#[from] InvalidScenario),
-    /// The emulator or the firmware did not do as it should.
+    /// The emulator or the firmware failed.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The image is not one of this firmware.
-    #[error("the image has no {name}")]
+    /// The image lacks a symbol or an instruction of this firmware.
+    #[error(
+        "the image has no {name}: it must be the firmware `ecu`; build it with `cargo xtask firmware`"
+    )]
     NoSymbol {
-        /// What is looked for in it.
+        /// Name of the symbol or instruction.
         name: &'static str,
     },
-    /// The firmware ended the run with a code of its own.
+    /// The firmware ended the run with an exit code.
     #[error("the firmware ended with exit code {exit_code}: {}", meaning(*exit_code))]
     Firmware {
         /// The code.
@@ -54,77 +57,77 @@ pub enum LevelError {
 /// The firmware's run.
 #[derive(Debug, Clone)]
 pub struct ProcessorRun {
-    /// What was driven.
+    /// The run.
     pub run: Run,
-    /// Time that it took.
+    /// Elapsed time.
     pub elapsed: Duration,
-    /// Counts that the PWM task (at most, in one period) and the control task took, one pair a control tick.
+    /// Counts of the PWM task (the maximum of one period) and of the control task, one pair per control tick.
     pub costs: Vec<(u16, u16)>,
     /// The firmware's log.
     pub log: Vec<String>,
 }
 
-/// What an ECU of f64 would have put out instead.
+/// Differences of an ECU in f64 from the ECU in f32.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct DoublePrecision {
-    /// Duty codes that differ from the ECU's.
+    /// Duty codes that differ.
     pub different_duties: usize,
     /// Greatest difference, counts.
     pub worst_counts: u16,
 }
 
-/// A manoeuvre at every level.
+/// A manoeuvre as MIL, SIL and PIL.
 #[derive(Debug, Clone)]
-pub struct Levels {
+pub struct MilSilPil {
     /// The manoeuvre's name.
     pub name: String,
-    /// Time simulated, s, the lead-in included.
+    /// Simulated time, including the lead-in, s.
     pub simulated_s: f64,
-    /// Model against software in the loop.
+    /// MIL compared with SIL.
     pub model_software: Comparison,
-    /// Software against processor in the loop.
+    /// SIL compared with PIL.
     pub software_processor: Comparison,
-    /// Model in the loop in f64 against that in f32, both in a loop of their own.
+    /// MIL in f64 compared with MIL in f32, each in a separate loop.
     pub double_precision: DoublePrecision,
     /// The firmware's run.
     pub processor: ProcessorRun,
 }
 
-impl Levels {
-    /// All levels command the same, bit for bit.
+impl MilSilPil {
+    /// The commands of MIL, SIL and PIL are bit-identical.
     pub fn agree(&self) -> bool {
         self.model_software.is_equal() && self.software_processor.is_equal()
     }
 
-    /// Simulated time over the time it took, processor in the loop.
+    /// Simulated time over elapsed time of PIL.
     pub fn speed(&self) -> f64 {
         self.simulated_s / self.processor.elapsed.as_secs_f64()
     }
 }
 
-/// Drives a manoeuvre at every level; `on_period` is called behind each PWM period of the firmware's run.
+/// Runs a manoeuvre as MIL, SIL and PIL. `on_period` is called after each PWM period of the firmware's run.
 ///
 /// # Errors
-/// If it cannot be driven.
-pub fn drive(
+/// If the manoeuvre cannot be run.
+pub fn run_all(
     scenario: &Scenario<f64>,
     manoeuvre: &Manoeuvre,
     target: &Target,
     on_period: impl FnMut(),
-) -> Result<Levels, LevelError> {
+) -> Result<MilSilPil, LoopError> {
     let own = ecu_scenario(scenario, manoeuvre);
-    let loop_of = || Drive::new(scenario, manoeuvre);
-    let model = run(&mut Model::new(&own)?, loop_of()?, || {})?.exchanges;
+    let vehicle = || VehicleNode::new(scenario, manoeuvre);
+    let model = run(&mut Model::new(&own)?, vehicle()?, || {})?.exchanges;
     let double = &mut Model::new(&own.map(&f64::from))?;
-    let double = run(double, loop_of()?, || {})?.exchanges;
+    let double = run(double, vehicle()?, || {})?.exchanges;
     let double_precision = deviation(&model, &double);
     drop(double);
-    let software = run(&mut Software::new(&own)?, loop_of()?, || {})?.exchanges;
+    let software = run(&mut Software::new(&own)?, vehicle()?, || {})?.exchanges;
     let model_software = compare(&model, &software, Depth::Commands);
     drop(model);
-    let processor = on_processor(&own, loop_of()?, target, on_period)?;
+    let processor = on_processor(&own, vehicle()?, target, on_period)?;
     let periods = processor.run.exchanges.len() as f64;
-    Ok(Levels {
+    Ok(MilSilPil {
         name: manoeuvre.name.clone(),
         simulated_s: periods / scenario.run.pwm_rate_hz,
         model_software,
@@ -134,16 +137,16 @@ pub fn drive(
     })
 }
 
-/// Drives with the firmware alone.
+/// Runs a manoeuvre as PIL only.
 ///
 /// # Errors
-/// If it cannot be driven.
+/// If the manoeuvre cannot be run.
 pub fn on_processor(
     ecu: &Scenario<f32>,
-    drive: Drive,
+    vehicle: VehicleNode,
     target: &Target,
     on_period: impl FnMut(),
-) -> Result<ProcessorRun, LevelError> {
+) -> Result<ProcessorRun, LoopError> {
     let session = Session::start(
         &target.image,
         target.machine,
@@ -154,12 +157,12 @@ pub fn on_processor(
     )?;
     let mut processor = Processor::new(session);
     let start = Instant::now();
-    let run = run(&mut processor, drive, on_period)?;
+    let run = run(&mut processor, vehicle, on_period)?;
     let elapsed = start.elapsed();
     let costs = processor.costs().to_vec();
     let ended = processor.finish()?;
     if ended.exit_code != 0 {
-        return Err(LevelError::Firmware {
+        return Err(LoopError::Firmware {
             exit_code: ended.exit_code,
         });
     }
