@@ -224,6 +224,17 @@ pub fn attractors(
 ///
 /// # Errors
 /// If the scenario is not valid.
+///
+/// ```
+/// use dynamics::attractor::{Kind, attractor};
+/// use dynamics::sweep::Timing;
+///
+/// let mut scenario = shared_model::Scenario::reconstruction();
+/// scenario.run.wheel_speed_rpm = 1600.0;
+/// let attractor = attractor(&scenario, Timing::new(100.0, 200.0)?, true)?;
+/// assert_eq!(attractor.kind, Kind::Periodic(2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn attractor(
     scenario: &Scenario<f64>,
     timing: Timing,

@@ -34,6 +34,18 @@ pub struct Basin {
 ///
 /// # Errors
 /// If a start's scenario is not valid.
+///
+/// ```
+/// use dynamics::basin::basin;
+/// use dynamics::sweep::{RunControl, Timing, Values};
+///
+/// let mut scenario = shared_model::Scenario::reconstruction();
+/// scenario.run.wheel_speed_rpm = 1600.0;
+/// let angles = Values::new("angle (rad)", -0.02, 0.02, 0.04)?;
+/// let basin = basin(&scenario, &angles, &angles, Timing::new(100.0, 200.0)?, RunControl::none())?;
+/// assert_eq!(basin.cells.len(), 4);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn basin(
     scenario: &Scenario<f64>,
     sideslips_rad: &Values,

@@ -29,6 +29,13 @@ pub struct Error {
 ///
 /// # Errors
 /// If the scenario is not valid at one of the steps, or the motion leaves all bounds.
+///
+/// ```
+/// let errors = dynamics::convergence::errors(&shared_model::Scenario::reconstruction(), 1.0)?;
+/// assert_eq!(errors.len(), 7);
+/// assert!(errors[6].error < errors[0].error);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn errors(scenario: &Scenario<f64>, time_s: f64) -> Result<Vec<Error>, SweepError> {
     let end = *Reference::new(scenario, REFERENCE_TOLERANCE)?.run(time_s)?;
     let mut errors: Vec<Error> = Vec::new();

@@ -230,6 +230,30 @@ impl<const K: usize> Segments<K> {
 ///
 /// # Errors
 /// If the motion diverges, or is too short.
+///
+/// ```
+/// use dynamics::flow::Flow;
+/// use nalgebra::{SVector, Vector1};
+/// use shared_model::Real;
+///
+/// /// x' = 4 x (1 - x), whose exponent is ln 2 per step.
+/// struct Logistic;
+///
+/// impl Flow<1> for Logistic {
+///     fn step<T: Real>(&self, x: &SVector<T, 1>) -> SVector<T, 1> {
+///         Vector1::new(T::from_f64(4.0) * x[0] * (T::one() - x[0]))
+///     }
+///
+///     fn step_s(&self) -> f64 {
+///         1.0
+///     }
+/// }
+///
+/// let [exponent] = dynamics::lyapunov::exponents(&Logistic, &Vector1::new(0.3), 20_000.0)?;
+/// let exponent = exponent.unwrap();
+/// assert!((exponent.per_s - 2_f64.ln()).abs() < 0.02);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn exponents<const N: usize, const K: usize>(
     flow: &impl Flow<N>,
     start: &SVector<f64, N>,

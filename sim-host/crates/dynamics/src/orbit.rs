@@ -118,6 +118,20 @@ pub struct Point {
 ///
 /// # Errors
 /// If a point's scenario is not valid, or the section is crossed at none of the values though the motions are not at rest.
+///
+/// ```
+/// use dynamics::orbit::{Outcome, Section, Start, diagram};
+/// use dynamics::sweep::{Parameter, RunControl, Timing, Values};
+///
+/// let scenario = shared_model::Scenario::reconstruction();
+/// let values = Values::new("wheel speed (rpm)", 1500.0, 1600.0, 100.0)?;
+/// let timing = Timing::new(100.0, 150.0)?;
+/// let (parameter, section) = (Parameter::Speed, Section::YawRateMaxima);
+/// let points = diagram(&scenario, parameter, &values, section, timing, Start::Fixed, RunControl::none())?;
+/// let Outcome::Meets { values } = &points[0].orbit else { panic!() };
+/// assert!(values.iter().all(|maximum| (maximum - values[0]).abs() < 1e-4)); // period one
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn diagram(
     scenario: &Scenario<f64>,
     parameter: Parameter,

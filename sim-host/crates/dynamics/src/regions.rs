@@ -83,6 +83,18 @@ pub struct Regions {
 ///
 /// # Errors
 /// If a value's scenario is not valid.
+///
+/// ```
+/// use dynamics::regions::regions;
+/// use dynamics::sweep::{Parameter, RunControl, Timing, Values};
+///
+/// let scenario = shared_model::Scenario::reconstruction();
+/// let values = Values::new("wheel speed (rpm)", 1500.0, 1700.0, 100.0)?;
+/// let timing = Timing::new(200.0, 400.0)?;
+/// let found = regions(&scenario, Parameter::Speed, &values, 10.0, timing, RunControl::none())?;
+/// assert!(found.complete && !found.edges.is_empty()); // a cycle at 1500 rpm, chaos at 1700 rpm
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn regions(
     scenario: &Scenario<f64>,
     parameter: Parameter,
