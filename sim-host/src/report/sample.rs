@@ -44,8 +44,8 @@ pub fn verdict() -> Verdict {
         Check::untested(
             "cycles",
             "Instructions of a PWM task",
-            "the emulator does not count instructions: start it with -icount, and look at what it \
-             says of it in its own log before starting again",
+            "the emulator does not count instructions: start it with -icount, and read its log \
+             about instruction counting before the next start",
         ),
     ])
 }

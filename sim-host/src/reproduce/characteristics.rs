@@ -1,4 +1,4 @@
-//! Figures 2, 9 to 11 and 14 to 16, and what of the dither an actuator can produce.
+//! Figures 2, 9 to 11 and 14 to 16, and the dither that an actuator can produce.
 
 use super::figures::name_of;
 use super::job::Quality;
@@ -52,8 +52,8 @@ pub fn characteristics(named: &Named, _quality: Quality, watch: RunControl) -> M
     material.drawings.push(Drawing {
         name: format!("realisability-{name}"),
         caption: format!(
-            "Realisability ({name}): what the steering actuator passes of a torque, and the torque that the paper's amplitude \
-             needs."
+            "Realisability ({name}): frequency response of the steering actuator, and the torque that the paper's \
+             amplitude requires."
         ),
         chart: bode_chart(scenario, &responses),
         csv: csv_of(&responses),

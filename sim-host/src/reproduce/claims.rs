@@ -80,7 +80,7 @@ pub fn of_square_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
             claim: "C5".into(),
             preset: preset.into(),
             measured: format!(
-                "{} at 0 V, {} at 0.14 V; on the way {}",
+                "{} at 0 V, {} at 0.14 V; between them {}",
                 name(start),
                 name(end),
                 composition(sweep, 0.0, 0.14)
@@ -165,7 +165,7 @@ fn yes_if(holds: bool) -> Reproduced {
 }
 
 fn name(kind: Option<Kind>) -> String {
-    kind.map_or_else(|| "not looked at".into(), |kind| kind.to_string())
+    kind.map_or_else(|| "not sampled".into(), |kind| kind.to_string())
 }
 
 /// The kind at the sample nearest to a value.
@@ -218,7 +218,7 @@ fn nearest_edge_of_chaos(sweep: &Regions, claimed: f64) -> Option<(f64, f64)> {
 fn edge_distance((claimed, found): &(f64, Option<(f64, f64)>)) -> String {
     match found {
         Some((middle, half)) => format!(
-            "chaos' edge at {middle:.1} \u{b1} {half:.1} rpm, {:+.1} from {claimed:.0}",
+            "edge of chaos at {middle:.1} \u{b1} {half:.1} rpm, {:+.1} from {claimed:.0}",
             middle - claimed
         ),
         None => format!("no edge of chaos near {claimed:.0}"),

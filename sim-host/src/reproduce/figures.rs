@@ -20,7 +20,7 @@ const RUN_S: f64 = 60.0;
 const SETTLED_S: f64 = 23.0;
 /// Lowest frequency of dither that is compared with averaging, rad/s.
 const LOWEST_RAD_PER_S: f64 = 200.0;
-/// States shown of a second: the curves are smooth.
+/// Every state of this number is shown: the curves are smooth.
 const SHOWN_EVERY: usize = 5;
 
 /// Waveform, amplitude (V) and number of the paper's two controlled motions.
@@ -47,8 +47,8 @@ pub fn suppression(named: &Named, _quality: Quality, watch: RunControl) -> Made 
         material.drawings.push(Drawing {
             name: format!("figure-{number}-{name}"),
             caption: format!(
-                "Figure {number} ({name}): {word} dither of {amplitude_v} V from 3 s on at {DITHERED_RPM} rpm; it ends on \
-                 {ends}. Above the time response, below the phase portrait of the last {:.0} s.",
+                "Figure {number} ({name}): {word} dither of {amplitude_v} V from 3 s on at {DITHERED_RPM} rpm; it leads to \
+                 {ends}. Above: time response. Below: phase portrait of the last {:.0} s.",
                 RUN_S - SETTLED_S
             ),
             chart: chart(number, &before, &after, scenario.dither.start_time_s),
@@ -56,7 +56,7 @@ pub fn suppression(named: &Named, _quality: Quality, watch: RunControl) -> Made 
         });
         material.findings.push((
             format!("{word} dither of {amplitude_v} V"),
-            format!("ends on {ends}"),
+            format!("leads to {ends}"),
         ));
         (watch.done)();
     }

@@ -3,37 +3,37 @@
 use super::material::Judgement;
 use shared_model::Scenario;
 
-/// How finely to look.
+/// Resolution of the sweeps and lengths of the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quality {
-    /// Coarse sweeps and short runs: a look at everything in seconds.
+    /// Coarse sweeps and short runs: everything in seconds.
     Quick,
-    /// As the claims need.
+    /// Sufficient to judge the claims.
     Full,
 }
 
-/// What to reproduce, and how.
+/// Options of a reproduction.
 #[derive(Debug, Clone)]
 pub struct Options {
-    /// How finely to look.
+    /// Resolution and lengths.
     pub quality: Quality,
-    /// Preset or vehicle, by name; each is judged by itself.
+    /// Preset or vehicle, by name; each is judged separately.
     pub scenarios: Vec<(String, Scenario<f64>)>,
 }
 
-/// How far the reproduction is.
+/// Progress of a reproduction.
 #[derive(Debug, Clone)]
 pub enum Progress {
-    /// That piece of so many begins.
+    /// A piece begins.
     Begins {
         /// Its number, from 1.
         number: usize,
-        /// How many there are.
+        /// The number of pieces.
         of: usize,
-        /// What it is.
+        /// Its title.
         title: String,
-        /// It was made by an earlier run and is kept.
+        /// It is kept from an earlier run.
         kept: bool,
         /// Share of this run's work that is done, from 0 to 1.
         done: f64,
@@ -42,11 +42,11 @@ pub enum Progress {
     Point,
 }
 
-/// What came out.
+/// Result of a reproduction.
 #[derive(Debug)]
 pub struct Summary {
     /// All judgements, by claim and preset.
     pub judgements: Vec<Judgement>,
-    /// Everything was made; otherwise the user has stopped it, and another run goes on from here.
+    /// All pieces are complete. Otherwise the user stopped the run; the next run continues.
     pub complete: bool,
 }

@@ -29,7 +29,7 @@ pub struct Table {
 pub struct Drawing {
     /// Name for files, for instance `figure-07`.
     pub name: String,
-    /// What is to be seen.
+    /// Contents of the figure.
     pub caption: String,
     /// The figure.
     pub chart: Chart,
@@ -57,7 +57,7 @@ pub struct Judgement {
     pub preset: String,
     /// What was measured, with its uncertainty.
     pub measured: String,
-    /// How far that is from the claim.
+    /// Distance from the claim.
     pub distance: String,
     /// The verdict.
     pub verdict: Reproduced,

@@ -1,4 +1,4 @@
-//! What the paper only mentions: all Lyapunov exponents, the Poincaré section and the frequency spectrum; and its own method for
+//! Measures that the paper only mentions: all Lyapunov exponents, the Poincaré section and the frequency spectrum; and its own method for
 //! the largest exponent beside two others.
 
 use super::job::Quality;
@@ -284,7 +284,7 @@ pub fn lengths(named: &Named, quality: Quality, watch: RunControl) -> Made {
         };
         let words: Vec<String> = speeds_rpm.into_iter().zip(made).filter_map(word).collect();
         Ok((
-            format!("{run_s} s behind {transient_s} s"),
+            format!("{run_s} s after a transient of {transient_s} s"),
             words.join(", "),
         ))
     };

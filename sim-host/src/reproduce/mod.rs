@@ -1,5 +1,5 @@
-//! The paper reproduced: its figures, its claims, and what it leaves out, as pieces that are made one after the other, kept when
-//! they are done, and not made again.
+//! Reproduction of the paper: its figures, its claims, its errata and further measurements. Complete pieces are kept and not
+//! computed again.
 
 mod characteristics;
 mod claims;
@@ -26,7 +26,7 @@ use pieces::Piece;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Makes what is not yet in `folder`, and the page over all of it.
+/// Computes the pieces that are not yet in `folder`, and writes the page over all pieces.
 ///
 /// # Errors
 /// If a file cannot be written or a scenario is not valid.
@@ -93,8 +93,8 @@ fn make(
     let done = || on_progress(Progress::Point);
     let watch = RunControl { stop, done: &done };
     let made = (piece.make)(&piece.scenario, options.quality, watch);
-    let made = made.with_context(|| format!("{} cannot be made", piece.title))?;
-    // Half a sweep is not a piece: another run makes it anew.
+    let made = made.with_context(|| format!("{} cannot be computed", piece.title))?;
+    // An incomplete sweep is discarded: the next run computes it again.
     if stop.load(Ordering::Relaxed) {
         return Ok(None);
     }

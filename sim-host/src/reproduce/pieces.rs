@@ -50,10 +50,10 @@ const fn part(
     }
 }
 
-/// Of the first scenario only: the readings that are compared include the other preset's.
+/// Parts of the first scenario only: the compared readings include the other preset's.
 const ONCE: [Part; 1] = [part(
     "sensitivity",
-    "How the edges move",
+    "Sensitivity of the edges",
     &[],
     [2.3, 2.3],
     sensitivity::sensitivity,
@@ -104,7 +104,7 @@ const PARTS: [Part; 10] = [
     ),
     part(
         "lengths",
-        "How long is long enough",
+        "Lengths of transient and run",
         &[],
         [0.5, 8.4],
         measures::lengths,
@@ -118,14 +118,14 @@ const PARTS: [Part; 10] = [
     ),
     part(
         "averaging",
-        "Averaging against the true signal",
+        "Averaged system against the true signal",
         &[],
         [5.5, 5.0],
         figures::averaging,
     ),
     part(
         "errata",
-        "What the print gets wrong",
+        "Errors of the print",
         &[],
         [0.7, 1.1],
         errata::errata,

@@ -1,4 +1,4 @@
-//! How the edges of the paper's regions move with what the paper does not give.
+//! Sensitivity of the edges of the paper's regions to parameters that the paper does not give.
 
 use super::job::Quality;
 use super::material::{Drawing, Made, Material, Named, Table};
@@ -123,9 +123,9 @@ fn residual_rpm(edges: [Option<f64>; 3]) -> Option<f64> {
 fn best_fit(residuals: &[(f64, f64)]) -> String {
     let best = residuals.iter().min_by(|a, b| a.1.total_cmp(&b.1));
     best.map_or_else(
-        || "untested: none of the values looked at has all three edges".into(),
+        || "untested: none of the sampled values has all three edges".into(),
         |(coefficient, residual)| {
-            format!("{coefficient} of those looked at, with the edges {residual:.1} rpm off in the root mean square")
+            format!("{coefficient} among the sampled values, with a root mean square error of the edges of {residual:.1} rpm")
         },
     )
 }

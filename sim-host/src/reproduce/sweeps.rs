@@ -14,7 +14,7 @@ use shared_model::dither::Waveform;
 /// Speed at which the paper dithers, rpm.
 const DITHERED_RPM: f64 = 1750.0;
 
-/// Transient of paper's start, and time observed, s.
+/// Transient from the paper's initial state, and time observed.
 fn timing(quality: Quality) -> Result<Timing, SweepError> {
     match quality {
         Quality::Quick => Timing::new(60.0, 160.0),
@@ -52,8 +52,8 @@ pub fn speed(named: &Named, quality: Quality, watch: RunControl) -> Made {
     let exponent = Drawing {
         name: format!("figure-06-{name}"),
         caption: format!(
-            "Figure 6 ({name}): largest Lyapunov exponent over the wheel speed, with three standard errors or what the run \
-             can resolve; the paper's regions I to IV shaded."
+            "Figure 6 ({name}): largest Lyapunov exponent over the wheel speed, with three standard errors or the resolution of \
+             the run; the paper's regions I to IV shaded."
         ),
         chart: exponent_chart(&sweep, &shaded),
         csv: exponent_table(&sweep).csv(),
@@ -87,7 +87,7 @@ pub fn square(named: &Named, quality: Quality, watch: RunControl) -> Made {
     Ok(Material {
         drawings: vec![drawing],
         judgements: claims::of_square_amplitudes(&named.name, &sweep),
-        findings: vec![("Kinds of motion found".into(), stretches(&sweep, "V", 4))],
+        findings: vec![("Regimes found".into(), stretches(&sweep, "V", 4))],
     })
 }
 
@@ -97,7 +97,7 @@ pub fn sine(named: &Named, quality: Quality, watch: RunControl) -> Made {
     Ok(Material {
         drawings: vec![drawing],
         judgements: claims::of_sine_amplitudes(&named.name, &sweep),
-        findings: vec![("Kinds of motion found".into(), stretches(&sweep, "V", 4))],
+        findings: vec![("Regimes found".into(), stretches(&sweep, "V", 4))],
     })
 }
 
@@ -207,7 +207,7 @@ fn exponent_chart(sweep: &Regions, shaded: &[Region]) -> Chart {
             y: AxisSpec::linear("exponent (1/s)"),
             series: vec![
                 series("exponent", 0, with(|exponent, _| exponent)),
-                series("what counts as positive", 1, with(|_, threshold| threshold)),
+                series("threshold of chaos", 1, with(|_, threshold| threshold)),
             ],
             regions: shaded.to_vec(),
             levels: vec![0.0],
@@ -260,7 +260,7 @@ fn orbit_table(sweep: &Regions, parameter: &str) -> Table {
     table
 }
 
-/// The regions in words; runs of short windows in chaos are one entry.
+/// The regions in words.
 fn stretches(sweep: &Regions, unit: &str, decimals: usize) -> String {
     let words = sweep.regions.iter().map(|region| {
         format!(

@@ -1,4 +1,4 @@
-//! Colours for numbers: light for small, dark for great, so that they also tell in grey.
+//! Colours for numbers: light for small, dark for great, so that the order remains in greyscale.
 
 use crate::axis::Axis;
 use crate::canvas::{Area, Colour, Line, TextStyle};

@@ -35,7 +35,7 @@ const fn line(colour: Colour, width: u32, dashes: &'static str) -> Line {
 pub const MAIN: Line = line(Colour(0x12, 0x3f, 0x8c), 3, "");
 /// The motion without dither beside one with it.
 pub const OTHER: Line = line(Colour(0x8a, 0x86, 0x82), 3, "3 5");
-/// The motion without dither in a panel of its own.
+/// The motion without dither in its own panel.
 pub const ALONE: Line = line(Colour(0x6b, 0x68, 0x66), 2, "");
 /// A limit.
 pub const LIMIT: Line = line(Colour(0xb3, 0x1b, 0x1b), 3, "18 8");

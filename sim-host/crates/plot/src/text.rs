@@ -3,7 +3,7 @@
 use crate::number::four_digits;
 use crate::verdict::{Check, Status, Verdict};
 
-/// The run that a check is about: its id behind the first `/`; `General` without one.
+/// The run that a check is about: the part of its id after the first `/`; `General` without one.
 pub fn run_of(check: &Check) -> &str {
     check.id.split_once('/').map_or("General", |(_, run)| run)
 }

@@ -13,7 +13,7 @@ const BUCKETS: usize = 400;
 const PANEL: i32 = 340;
 const ROOM: f64 = 1.2;
 
-/// The figure: a panel for each run that chaos parts, and one for those that must never part. Runs
+/// The figure: a panel for each chaotic run, and one for the runs that must stay together. Runs
 /// without distances are left out.
 pub fn draw(runs: &[RunReport]) -> String {
     let styled: Vec<(&RunReport, Line)> = runs
@@ -33,18 +33,18 @@ pub fn draw(runs: &[RunReport]) -> String {
         legend.push(("predicted horizon".into(), Sample::Band));
         legend.push(("expected".into(), Sample::Line(INSTANT)));
     }
-    // A panel for each horizon, so that it is clear whose it is.
+    // Each horizon has a panel, which assigns it to its run.
     let mut groups: Vec<Group> = parting
         .into_iter()
         .map(|run| Group {
-            caption: format!("must part: {}", run.0.title),
+            caption: format!("chaotic: {}", run.0.title),
             remark: run.0.horizon_s.map_or(String::new(), horizon_text),
             runs: vec![run],
         })
         .collect();
     if !bounded.is_empty() {
         groups.push(Group {
-            caption: "must never reach the limit".into(),
+            caption: "must stay below the limit".into(),
             remark: String::new(),
             runs: bounded,
         });
@@ -60,7 +60,7 @@ pub fn draw(runs: &[RunReport]) -> String {
                 .filter(|p| p.0.is_finite() && p.1.is_finite())
         };
         let limits = runs.iter().map(|run| run.divergence_limit);
-        // So much room that no curve lies on the frame.
+        // Room between the curves and the frame.
         let distances = values().map(|p| p.1).chain(limits);
         let y = Axis::decades(
             "relative distance",
@@ -90,7 +90,7 @@ fn horizon_text([least, expected, greatest]: [f64; 3]) -> String {
     format!("predicted at {expected} s, {least} to {greatest} s")
 }
 
-/// End of the time axis: that of the runs, or somewhat later to show when one was expected to part.
+/// End of the time axis: that of the runs, or somewhat later to include an expected separation.
 fn end_s(runs: &[RunReport], data_end_s: f64) -> f64 {
     runs.iter()
         .filter_map(|run| run.horizon_s)

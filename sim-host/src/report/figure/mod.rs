@@ -14,7 +14,7 @@ use crate::report::input::ReportInput;
 pub struct Figure {
     /// Name of its file, without `.svg`.
     pub name: String,
-    /// What is to be seen and how it was drawn.
+    /// Contents of the figure and how it was drawn.
     pub caption: String,
     /// The SVG document.
     pub svg: String,
@@ -46,7 +46,7 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
         figures.push(Figure {
             name: "pwm-trace".into(),
             caption: "Voltage of each PWM period from its duty code around the dither's start: \
-                the dither as the motor's half bridge gets it, quantised in time and in counts."
+                the dither at the motor's half bridge, quantised in time and in counts."
                 .into(),
             svg: pwm_trace::draw(input.runs),
         });
@@ -54,18 +54,18 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
     figures.push(Figure {
         name: "divergence".into(),
         caption:
-            "Distance of free f32 and f64 runs from the same start. Runs that chaos parts, each \
-            with the time predicted from the Lyapunov exponent (shaded: least to greatest, line: \
-            expected); below them the runs that must never reach the limit. Greatest value in each \
-            drawn interval."
+            "Distance of free f32 and f64 runs from the same start. Above: chaotic runs, each \
+            with the time of separation predicted from the Lyapunov exponent (shaded: least to \
+            greatest, line: expected). Below: runs that must stay below the limit. The curves show \
+            the greatest value in each interval."
                 .into(),
         svg: divergence::draw(input.runs),
     });
     figures.push(Figure {
         name: "one-step-defect".into(),
         caption: "Defect of each f32 step on the firmware against the host's f64 step from the \
-            same state, over its rounding bound: at most 1 passes. Greatest value in each drawn \
-            interval; smaller ones than the axis shows lie on its lower edge."
+            same state, over its rounding bound: at most 1 passes. The curves show the greatest value \
+            in each interval. Values below the axis lie on its lower edge."
             .into(),
         svg: one_step_defect::draw(input.runs),
     });
@@ -79,8 +79,8 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
     let rows: Vec<_> = runs.chain(drives).collect();
     figures.push(Figure {
         name: "instructions".into(),
-        caption: "How often the control task, and the slowest PWM task of each step, took how \
-            many instructions."
+        caption: "Histograms of the instructions of the control task, and of the slowest PWM task \
+            of each step."
             .into(),
         svg: instructions::draw(&rows),
     });
@@ -88,7 +88,7 @@ pub fn all(input: &ReportInput) -> Vec<Figure> {
         figures.push(Figure {
             name: driven.id.clone(),
             caption: format!(
-                "{}. The vehicle on the host, the ECU on the emulated target, one exchange a PWM period.",
+                "{}. The vehicle on the host, the ECU on the emulated target, one exchange per PWM period.",
                 driven.title
             ),
             // The heading names the loop itself.
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_run_gives_figures_that_say_so() {
+    fn an_empty_run_gives_figures_without_data() {
         let figures = figures_of(sample::empty_run());
         assert_eq!(figures.len(), 6);
         for figure in figures {
@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn not_a_number_everywhere_gives_figures_that_say_so() {
+    fn not_a_number_everywhere_gives_figures_without_data() {
         let mut run = sample::runs().remove(1);
         for state in &mut run.trace.states {
             state.x = Vector4::repeat(f64::NAN);

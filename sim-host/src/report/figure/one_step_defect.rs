@@ -11,7 +11,7 @@ use plot::style::{LIMIT, MAIN};
 /// About one for each pixel.
 const BUCKETS: usize = 700;
 const PANEL: i32 = 190;
-/// Where the axis begins: smaller defects are nothing to look at.
+/// Lower end of the axis. Smaller defects lie on it.
 const LEAST: f64 = 1e-4;
 
 /// The figure: a panel for each run of which there are defects.

@@ -12,7 +12,7 @@ use shared_model::vehicle::{SIDESLIP, YAW_RATE};
 
 const MOST_POINTS: usize = 4000;
 const PANEL: i32 = 560;
-/// A motion that stays within this many units of the drawing is marked by a dot.
+/// A trajectory that stays within this many units of the drawing is marked by a dot.
 const DOT: f64 = 8.0;
 
 /// The figure for a run without dither and one with it.

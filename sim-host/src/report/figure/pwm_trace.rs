@@ -24,7 +24,7 @@ pub fn draw(runs: &[RunReport]) -> String {
         ("voltage of each PWM period".into(), Sample::Line(MAIN)),
         ("dither on".into(), Sample::Line(INSTANT)),
     ];
-    let heading = "PWM duty as the dither sets in";
+    let heading = "PWM voltage at the start of the dither";
     let height = stack_height(runs.len(), PANEL);
     figure(heading, &legend, height, |area| {
         let rows = stack(area, runs.len(), PANEL, "time from the dither's start (ms)");
