@@ -64,7 +64,7 @@ fn bad_input_is_refused() {
         ),
         (
             &["reproduce", "--quick", "--out", "file"],
-            &["cannot write file", "is no folder"],
+            &["cannot write file", "is not a folder"],
         ),
     ];
     for (arguments, parts) in cases {

@@ -94,12 +94,12 @@ fn recordings_are_replayed_and_damage_is_said() {
     for at in [9, whole.len() / 2, whole.len() - 1] {
         let mut damaged = whole.clone();
         damaged[at] ^= 1;
-        refused(&damaged, &["r.loop", "check sum"]);
+        refused(&damaged, &["r.loop", "checksum"]);
     }
-    refused(&whole[..whole.len() - 54], &["check sum"]);
-    refused(&whole[..8], &["check sum"]);
-    refused(b"time_s,duty\n", &["is no recording"]);
-    refused(b"", &["is no recording"]);
+    refused(&whole[..whole.len() - 54], &["checksum"]);
+    refused(&whole[..8], &["checksum"]);
+    refused(b"time_s,duty\n", &["is not a recording"]);
+    refused(b"", &["is not a recording"]);
 
     // Another command in the recording, and the check sum right: what differs is the command.
     let mut other = Recording::read(&whole).expect("it is whole");
