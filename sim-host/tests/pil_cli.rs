@@ -101,7 +101,7 @@ fn recordings_are_replayed_and_damage_is_said() {
     refused(b"time_s,duty\n", &["is not a recording"]);
     refused(b"", &["is not a recording"]);
 
-    // Another command in the recording, and the check sum right: what differs is the command.
+    // Another command in the recording, with a correct checksum: only the command differs.
     let mut other = Recording::read(&whole).expect("it is whole");
     other.exchanges[300].from_ecu.duty_code ^= 1;
     let mut bytes = Vec::new();

@@ -218,7 +218,7 @@ pub fn paper_regions(parameter: Parameter, from: f64, to: f64) -> Vec<Region> {
     all.filter(|region| region.to > region.from).collect()
 }
 
-/// More dots than this are drawn small: so many large ones would hide each other.
+/// Number of dots above which they are drawn small, so that they do not hide each other.
 const MOST_LARGE_DOTS: usize = 3000;
 /// Colours of dots before they repeat.
 const COLOURS: usize = 4;
