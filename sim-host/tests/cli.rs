@@ -217,8 +217,8 @@ fn outputs_are_not_overwritten_unasked() {
     assert_eq!(csv.lines().count(), 1001);
     // A folder that is not there, or is a file.
     for (out, part) in [
-        ("missing/t.csv", "there is no folder missing"),
-        ("t.csv/u.csv", "t.csv is no folder"),
+        ("missing/t.csv", "the folder missing does not exist"),
+        ("t.csv/u.csv", "t.csv is not a folder"),
     ] {
         assert_refused(
             folder.path(),

@@ -64,7 +64,7 @@ fn bad_input_is_refused() {
         ),
         (
             &["reproduce", "--quick", "--out", "file"],
-            &["cannot write file", "is no folder"],
+            &["cannot write file", "is not a folder"],
         ),
     ];
     for (arguments, parts) in cases {
@@ -112,7 +112,7 @@ fn results_are_written() {
     assert!(!read("a.csv").contains("NaN") && !read("c.csv").contains("NaN"));
 }
 
-/// Each of the examples is a configuration that subcommands take, and what differs from the paper is said.
+/// Each example is a valid configuration, and its differences from the paper are reported.
 #[test]
 fn the_examples_run() {
     let folder = folder();

@@ -1,6 +1,6 @@
-//! The examples of all help texts, run one after the other in one empty folder, as a reader would who copies them.
+//! The examples of all help texts, run in sequence in one empty folder, as a reader would copy them.
 //!
-//! Those that need the firmware must get as far as its missing file; those that take long must begin their work.
+//! Examples that need the firmware must reach its missing file; long examples must begin their work.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;

@@ -50,10 +50,10 @@ fn every_destination_is_checked_before_the_work() {
     for (line, options) in WRITERS {
         for option in options {
             for (path, part) in [
-                ("none/x", "there is no folder none"),
+                ("none/x", "the folder none does not exist"),
                 ("there", "there exists; give --force"),
                 ("link", "link exists; give --force"),
-                ("there/x", "there is no folder"),
+                ("there/x", "there is not a folder"),
                 (".", "a folder"),
             ] {
                 assert_refused(at, words(&format!("{line} {option} {path}")), &[part]);

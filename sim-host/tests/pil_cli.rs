@@ -94,14 +94,14 @@ fn recordings_are_replayed_and_damage_is_said() {
     for at in [9, whole.len() / 2, whole.len() - 1] {
         let mut damaged = whole.clone();
         damaged[at] ^= 1;
-        refused(&damaged, &["r.loop", "check sum"]);
+        refused(&damaged, &["r.loop", "checksum"]);
     }
-    refused(&whole[..whole.len() - 54], &["check sum"]);
-    refused(&whole[..8], &["check sum"]);
-    refused(b"time_s,duty\n", &["is no recording"]);
-    refused(b"", &["is no recording"]);
+    refused(&whole[..whole.len() - 54], &["checksum"]);
+    refused(&whole[..8], &["checksum"]);
+    refused(b"time_s,duty\n", &["is not a recording"]);
+    refused(b"", &["is not a recording"]);
 
-    // Another command in the recording, and the check sum right: what differs is the command.
+    // Another command in the recording, with a correct checksum: only the command differs.
     let mut other = Recording::read(&whole).expect("it is whole");
     other.exchanges[300].from_ecu.duty_code ^= 1;
     let mut bytes = Vec::new();

@@ -40,7 +40,7 @@ fn written(arguments: &[&str]) -> Written {
     let figure = read("a.svg");
     assert!(figure.starts_with("<svg") && !figure.contains("no data"));
     assert!(!csv.contains("NaN") && !figure.contains("NaN"));
-    // Nothing is overwritten unasked.
+    // Nothing is overwritten without --force.
     assert_ends(&mut command(folder.path(), &all), 2);
     all.push("--force");
     assert_ends(&mut command(folder.path(), &all), 0);

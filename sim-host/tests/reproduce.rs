@@ -54,7 +54,7 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
     );
     assert!(stopped.join("index.html").exists());
 
-    // Go on, to the end of the fourth piece: the first two are kept.
+    // Continue to the end of the fourth part: the first two are kept.
     let kept = Mutex::new(Vec::new());
     let go_on = |folder: &Path| {
         let stop = AtomicBool::new(false);
@@ -62,7 +62,9 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
             Progress::Begins {
                 kept: true, number, ..
             } => {
-                kept.lock().expect("nobody panics with it").push(number);
+                kept.lock()
+                    .expect("no thread panics while it is locked")
+                    .push(number);
             }
             Progress::Begins { number: 5, .. } => stop.store(true, Ordering::Relaxed),
             _ => {}
@@ -70,7 +72,10 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
         .expect("it can be made")
     };
     assert_eq!(go_on(&stopped).judgements.len(), 8);
-    assert_eq!(*kept.lock().expect("nobody panics with it"), [1, 2]);
+    assert_eq!(
+        *kept.lock().expect("no thread panics while it is locked"),
+        [1, 2]
+    );
 
     // At once, on one thread.
     let pool = rayon::ThreadPoolBuilder::new()
@@ -87,8 +92,10 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
     assert!(text.starts_with("wheel_speed_rpm,yaw_rate_maximum_rad_per_s"));
     assert!(!text.contains("NaN"));
 
-    // A digit that was changed by hand, in the data of the second piece and in the record of the third: both are made anew.
-    kept.lock().expect("nobody panics with it").clear();
+    // A digit was changed in the data of the second part and in the record of the third: both are computed again.
+    kept.lock()
+        .expect("no thread panics while it is locked")
+        .clear();
     for name in ["figure-07-reconstruction.csv", "square-reconstruction.json"] {
         let mut bytes = a[name].clone();
         let digit = bytes.iter().rposition(u8::is_ascii_digit);
@@ -96,7 +103,10 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
         fs::write(stopped.join("figures").join(name), bytes).expect("it can be written");
     }
     go_on(&stopped);
-    assert_eq!(*kept.lock().expect("nobody panics with it"), [1, 4]);
+    assert_eq!(
+        *kept.lock().expect("no thread panics while it is locked"),
+        [1, 4]
+    );
     assert!(files(&stopped) == a);
 }
 

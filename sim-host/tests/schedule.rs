@@ -34,7 +34,7 @@ fn analysis(waveform: Waveform, plan: &Plan) -> Analysis {
         done: &|| (),
     };
     let made = schedule(&scenario, plan, None, watch).expect("the scenarios are valid");
-    made.expect("nobody stops it")
+    made.expect("it is not interrupted")
 }
 
 /// An entry needs its neighbours' ranges, so of three speeds the middle one is as in the whole table.

@@ -1,20 +1,20 @@
-//! Files from outside, of which no more is read than such a file can have.
+//! Input files, with a maximum length for each type.
 
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Longest text of a configuration, a manoeuvre or a record of work, bytes.
+/// Maximum length of a configuration, a manoeuvre or a record of work, bytes.
 pub const TEXT_BYTES: u64 = 16 << 20;
-/// Longest recording, bytes: of the telemetry of a day, or of an hour in the loop.
+/// Maximum length of a recording, bytes: telemetry of a day, or an hour in the loop.
 pub const RECORDING_BYTES: u64 = 4 << 30;
-/// Longest image of a firmware with all its symbols, bytes.
+/// Maximum length of a firmware image with all symbols, bytes.
 pub const IMAGE_BYTES: u64 = 256 << 20;
-/// First bytes of a file, by which its kind is known.
+/// Number of first bytes that identify the type of a file.
 const START_BYTES: u64 = 64;
 
-/// Reads a file that has at most `most` bytes. Where its first bytes are not as they must be, nothing after them is read: the
-/// file's own reader refuses them.
+/// Reads a file of at most `most` bytes. If its first bytes are not of the expected type, only these are read and returned, and the
+/// caller rejects them.
 ///
 /// # Errors
 /// If it cannot be read, or is longer.
@@ -27,7 +27,7 @@ pub fn read(path: &Path, most: u64, is_start: impl Fn(&[u8]) -> bool) -> io::Res
     let mut bytes = Vec::new();
     (&mut file).take(START_BYTES).read_to_end(&mut bytes)?;
     if is_start(&bytes) {
-        // One byte more than may be: what is no regular file does not know its length.
+        // One byte more than allowed, because the length of a pipe or a device is unknown.
         file.take(most + 1 - bytes.len() as u64)
             .read_to_end(&mut bytes)?;
     }
@@ -37,10 +37,10 @@ pub fn read(path: &Path, most: u64, is_start: impl Fn(&[u8]) -> bool) -> io::Res
     Ok(bytes)
 }
 
-/// Reads a text that has at most `most` bytes.
+/// Reads a text of at most `most` bytes.
 ///
 /// # Errors
-/// If it cannot be read, is longer, or is no UTF-8.
+/// If it cannot be read, is longer, or is not UTF-8.
 pub fn read_text(path: &Path, most: u64) -> io::Result<String> {
     let bytes = read(path, most, |_| true)?;
     String::from_utf8(bytes)

@@ -1,9 +1,9 @@
-//! Output files of the whole program: checked before the work begins, then complete or not there.
+//! Output files: checked before the work begins, then complete or absent.
 //!
 //! | destination | treatment |
 //! |---|---|
-//! | regular file, or nothing yet | written aside and renamed at the end; mode and owner are kept; an existing one needs force |
-//! | symbolic link | followed, and it stays; it counts as existing even if its target is missing |
+//! | regular file, or nothing yet | written to a temporary file and renamed at the end; mode and owner are kept; an existing file requires `--force` |
+//! | symbolic link | followed and kept; it counts as existing even if its target is missing |
 //! | file with more than one hard link | refused: a rename would cut the link, a write in place can be interrupted |
 //! | pipe, character device, open descriptor (`/dev/stdout`, `>(command)`), `-` for standard output | written into |
 //! | folder, socket, block device | refused |
@@ -23,16 +23,16 @@ use std::path::{Path, PathBuf};
 
 pub use place::Unwritable;
 
-/// Where an output's content is written to.
+/// Destination of an output's content.
 pub type Writer = BufWriter<File>;
 
-/// Why the content of an output could not be made or written.
+/// The reason why the content of an output could not be produced or written.
 pub type ContentError = Box<dyn Error + Send + Sync>;
 
-/// An output was not written, or cannot be.
+/// An error of an output.
 #[derive(Debug, thiserror::Error)]
 pub enum WriteError {
-    /// There is no place for it, or its content could not be made or written.
+    /// It has no valid destination, or its content could not be produced or written.
     #[error("cannot write {output}")]
     Output {
         /// Its path, or standard output.
@@ -40,11 +40,11 @@ pub enum WriteError {
         /// The reason.
         source: ContentError,
     },
-    /// The file is there, and may not be overwritten.
+    /// The file exists and must not be overwritten.
     #[error("{} exists; give --force to overwrite it", .0.display())]
     Exists(PathBuf),
     /// Two destinations of a job are the same file.
-    #[error("{first} and {second} are the same file; give each its own")]
+    #[error("{first} and {second} are the same file; give each a separate file")]
     Twice {
         /// Option and path of one.
         first: String,
@@ -52,10 +52,10 @@ pub enum WriteError {
         second: String,
     },
     /// Standard output is redirected into the file.
-    #[error("{0}: the standard output of this command is written there too; give another name")]
+    #[error("{0}: standard output of this command is also written to this file; give another name")]
     IsStdout(String),
-    /// A folder for outputs cannot be made.
-    #[error("cannot make the folder {}", path.display())]
+    /// A folder for outputs cannot be created.
+    #[error("cannot create the folder {}", path.display())]
     Folder {
         /// Its path.
         path: PathBuf,
@@ -73,7 +73,7 @@ pub struct Outputs {
 }
 
 impl Outputs {
-    /// No destination yet. With `force`, files that exist may be overwritten.
+    /// No destination yet. With `force`, existing files may be overwritten.
     pub fn new(force: bool) -> Self {
         Self {
             force,
@@ -82,7 +82,7 @@ impl Outputs {
         }
     }
 
-    /// Notes a file that the job reads, which no output may overwrite.
+    /// Adds an input file, which no output may overwrite.
     pub fn reads(&mut self, option: &str, path: &Path) {
         if let Ok(metadata) = fs::metadata(path) {
             self.taken
@@ -90,10 +90,10 @@ impl Outputs {
         }
     }
 
-    /// Checks that the file can be written, and that no other option has it.
+    /// Checks that the file can be written and is not that of another option.
     ///
     /// # Errors
-    /// The first reason against it.
+    /// The first violation.
     pub fn file(&mut self, option: &str, path: &Path) -> Result<(), WriteError> {
         let place = checked(path, self.force)?;
         let identity = place.identity().map_err(|error| unwritten(path, error))?;
@@ -111,16 +111,16 @@ impl Outputs {
         self.take(option, path, identity)
     }
 
-    /// Checks that files can be written into the folder, which may be missing, and that no other option has its name.
+    /// Checks that files can be written into the folder, which may be missing, and that it is not that of another option.
     ///
     /// # Errors
-    /// The first reason against it.
+    /// The first violation.
     pub fn folder(&mut self, option: &str, path: &Path) -> Result<(), WriteError> {
         let identity = place::folder(path).map_err(|error| unwritten(path, error))?;
         self.take(option, path, identity)
     }
 
-    /// Whether one of them is standard output, so that nothing else may be written there.
+    /// Whether one of the outputs is standard output, so that messages must not be written to it.
     pub fn data_on_stdout(&self) -> bool {
         self.data_on_stdout
     }
@@ -164,19 +164,19 @@ pub fn is_file(path: &Path) -> bool {
     matches!(Place::of(path), Ok(Place::File { .. }))
 }
 
-/// Makes a folder for outputs, with those above it, unless it is there.
+/// Creates a folder for outputs and its parents, unless it exists.
 ///
 /// # Errors
-/// If it cannot be made.
+/// If it cannot be created.
 pub fn make_folder(path: &Path) -> Result<(), WriteError> {
     let path = path.to_owned();
     fs::create_dir_all(&path).map_err(|source| WriteError::Folder { path, source })
 }
 
-/// Writes an output. With `force`, a file that exists is overwritten.
+/// Writes an output. With `force`, an existing file is overwritten.
 ///
 /// # Errors
-/// If there is no place for it, if `content` fails, or if not all of it can be written.
+/// If it has no valid destination, `content` fails, or it cannot be written completely.
 pub fn write(
     path: &Path,
     force: bool,
@@ -220,7 +220,7 @@ pub fn write_json(path: &Path, results: &impl Serialize, force: bool) -> Result<
     })
 }
 
-/// Writes rows as CSV, the columns named as their fields are.
+/// Writes rows as CSV, with the field names as column names.
 ///
 /// # Errors
 /// As [`write`].

@@ -1,13 +1,13 @@
-//! An image may say of itself whatever it likes: that all its symbols have the same name of a megabyte, or that all its
-//! functions are the same code. What is read of it is bounded by its length all the same.
+//! Limits on reading an image. A damaged image may claim that all symbols have the same name of a megabyte, or that all functions
+//! are the same code. The number of bytes read is bounded by the length of the file.
 
 use crate::AnalysisError;
 use object::{Object, ObjectSection, ObjectSymbol};
 
-/// How many times a file's length may be read of it. Images as a linker writes them take less than once.
+/// Maximum number of bytes read, as a multiple of the file's length. Images from a linker need less than one.
 const TIMES: u64 = 8;
 
-/// What is left to be read.
+/// Bytes that may still be read.
 pub(crate) struct Budget {
     left: u64,
     what: &'static str,
@@ -30,10 +30,10 @@ impl Budget {
     }
 }
 
-/// An image whose names can all be looked at.
+/// An image whose names can all be read.
 ///
 /// # Errors
-/// If it is no ELF, or its names together are many times as long as the file.
+/// If it is not an ELF file, or its names together are many times as long as the file.
 pub(crate) fn parse(bytes: &[u8]) -> Result<object::File<'_>, AnalysisError> {
     let file = object::File::parse(bytes)?;
     let mut names = Budget::new(bytes.len(), "names");

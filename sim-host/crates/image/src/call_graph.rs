@@ -1,9 +1,8 @@
 //! The call graph of an image, read from its machine code.
 //!
-//! Functions are the symbols of that kind. Their code is swept from start to end, the data in it left out as the symbols
-//! `$d` and `$t` mark it. A branch out of a function is a call at the end of it, which here keeps its caller's frame.
-//! A call through a pointer may reach every function whose address is somewhere in the image: in a word of the data, or
-//! put together by two instructions.
+//! Functions are the symbols of type function. Their code is decoded from start to end, except for data, which the symbols `$d` and
+//! `$t` mark. A branch out of a function is a tail call, for which the caller's frame is kept in the bound. A call through a pointer
+//! may reach every function whose address occurs in the image: in a word of the data, or composed by two instructions.
 
 use crate::AnalysisError;
 use crate::budget::{self, Budget};
@@ -11,42 +10,42 @@ use crate::thumb::{self, Effect};
 use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Section with the compiler's own figures.
+/// Section with the compiler's stack sizes.
 const STACK_SIZES: &str = ".stack_sizes";
-/// Its words are functions, but the core calls those, no pointer.
+/// Its words are addresses of functions that the core calls, not a pointer.
 const VECTOR_TABLE: &str = ".vector_table";
 
-/// Longest name of a function that is kept, bytes.
+/// Maximum length of a function's name, bytes.
 const LONGEST_NAME: usize = 1024;
 
 /// One function.
 #[derive(Debug, Clone, Default)]
 pub struct Function {
-    /// Length of its code, bytes; 0 where the symbol does not say, which is up to the next function.
+    /// Length of its code, bytes; 0 if the symbol has none, which means up to the next function.
     pub length_bytes: u32,
     /// Its names, without the compiler's hashes; several where functions of the same code share it.
     pub names: BTreeSet<String>,
-    /// Bytes of stack that the compiler says it takes; `None` for code that was not compiled with this image.
+    /// Stack size given by the compiler, bytes; `None` for code that was not compiled with this image.
     pub stated_bytes: Option<u32>,
-    /// Sum of all that its instructions take from the stack, bytes.
+    /// Sum of the stack use of its instructions, bytes.
     pub counted_bytes: u32,
-    /// The sum is not all: an instruction sets the stack pointer itself.
+    /// Whether an instruction sets the stack pointer, so that the sum is not an upper bound.
     pub sets_stack_pointer: bool,
     /// Addresses of the functions that it calls.
     pub calls: BTreeSet<u32>,
     /// Calls through a pointer.
     pub indirect_calls: u32,
-    /// Branches to what is no function.
+    /// Branches to addresses outside all functions.
     pub strays: Vec<u32>,
 }
 
 impl Function {
-    /// The first of its names by the alphabet.
+    /// The first of its names in alphabetical order.
     pub fn name(&self) -> &str {
         self.names.first().map_or("", String::as_str)
     }
 
-    /// Bytes of stack that it takes at most; `None` if nobody can say.
+    /// Upper bound of its stack size, bytes; `None` if there is none.
     pub fn frame_bytes(&self) -> Option<u32> {
         match self.stated_bytes {
             Some(stated) => Some(stated.max(self.counted_bytes)),
@@ -60,7 +59,7 @@ impl Function {
 pub struct CallGraph {
     /// The functions by address.
     pub functions: BTreeMap<u32, Function>,
-    /// Those that a pointer may point to.
+    /// Functions whose address is taken.
     pub address_taken: BTreeSet<u32>,
 }
 
@@ -68,7 +67,7 @@ impl CallGraph {
     /// Reads the graph.
     ///
     /// # Errors
-    /// If the image is damaged, or was compiled without the functions' frames.
+    /// If the image is damaged, or was compiled without stack sizes.
     pub fn read(bytes: &[u8]) -> Result<Self, AnalysisError> {
         let file = budget::parse(bytes)?;
         let mut functions = named(&file)?;
@@ -191,7 +190,7 @@ impl CallGraph {
         Ok(())
     }
 
-    /// Takes a number that may be a function's address; those are odd.
+    /// Records a number that may be a function's address, which is odd.
     fn note_pointer(&mut self, number: Option<u32>) {
         let function = number.filter(|number| number % 2 == 1).map(|odd| odd - 1);
         if let Some(function) = function.filter(|f| self.functions.contains_key(f)) {

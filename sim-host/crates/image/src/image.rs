@@ -1,29 +1,29 @@
-//! The firmware's image: is it one for this machine, and how large is it?
+//! The firmware's image: machine, size and symbols.
 
 use crate::budget;
 use files::input::{self, IMAGE_BYTES};
 use object::{Architecture, Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
 use std::path::{Path, PathBuf};
 
-/// Data addresses start here on every Cortex-M.
+/// First data address of every Cortex-M.
 const RAM_START: u64 = 0x2000_0000;
 
-/// A firmware image that has been checked.
+/// A valid firmware image.
 #[derive(Debug, Clone)]
 pub struct Image {
-    /// Where it is.
+    /// Its path.
     pub path: PathBuf,
     /// Its bytes.
     pub bytes: Vec<u8>,
-    /// Flash that it takes, bytes: code, constants and the start values of variables.
+    /// Flash size, bytes: code, constants and the start values of variables.
     pub flash_bytes: u64,
-    /// RAM that its static variables take, bytes; the stack comes on top.
+    /// RAM size of its static variables, bytes, without the stack.
     pub ram_bytes: u64,
-    /// The compiler that it was built with, as it calls itself; empty if it does not say.
+    /// Name and version of the compiler; empty if unknown.
     pub compiler: String,
 }
 
-/// Why a file is no image.
+/// An error of reading an image.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The file cannot be read.
@@ -34,12 +34,12 @@ pub enum ImageError {
         /// Why.
         source: std::io::Error,
     },
-    /// It is no ELF file.
+    /// It is not an ELF file.
     #[error("{path} is not an ELF file: {reason}")]
     NotElf {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The error.
         reason: String,
     },
     /// It is for another machine.
@@ -56,7 +56,7 @@ impl Image {
     /// Reads and checks an image.
     ///
     /// # Errors
-    /// If the file cannot be read or is no ELF for 32-bit Arm.
+    /// If the file cannot be read or is not an ELF file for 32-bit Arm.
     pub fn open(path: &Path) -> Result<Self, ImageError> {
         let path = path.to_path_buf();
         let is_elf = |start: &[u8]| start.starts_with(&elf::ELFMAG);
@@ -98,7 +98,7 @@ impl Image {
     pub fn address_of(&self, name: &str) -> Option<u32> {
         let file = object::File::parse(&*self.bytes).ok()?;
         let symbol = file.symbols().find(|s| s.name() == Ok(name))?;
-        // The lowest bit of a function's symbol says that it is Thumb code; it is no part of the address.
+        // The lowest bit of a function's symbol marks Thumb code and is not part of the address.
         let thumb = u64::from(symbol.kind() == object::SymbolKind::Text);
         u32::try_from(symbol.address() & !thumb).ok()
     }
@@ -125,7 +125,7 @@ impl Image {
         symbols
     }
 
-    /// Address of the first place among the code that holds this halfword, low byte first.
+    /// Address of the first occurrence of this halfword in the code, low byte first.
     pub fn find_code(&self, halfword: [u8; 2]) -> Option<u32> {
         let file = object::File::parse(&*self.bytes).ok()?;
         let section = file.section_by_name(".text")?;
@@ -151,7 +151,7 @@ pub struct Symbol {
     pub is_code: bool,
 }
 
-/// The compiler's line among those of all tools that had a hand in it.
+/// The compiler's line among the lines of all tools.
 fn compiler(file: &object::File<'_>) -> String {
     let section = file.section_by_name(".comment");
     let bytes = section

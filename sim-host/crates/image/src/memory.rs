@@ -1,4 +1,4 @@
-//! What a board's memory map offers, and what an image takes of it.
+//! The memory map of a board.
 
 use crate::AnalysisError;
 use object::{Object, ObjectSymbol};
@@ -12,7 +12,7 @@ pub(crate) fn address_of(
     Ok(symbol.ok_or(AnalysisError::NoSymbol(name))?.address())
 }
 
-/// Why a memory map cannot be used.
+/// An invalid memory map.
 #[derive(Debug, thiserror::Error)]
 #[error("the memory map has no line `{0} : ORIGIN = ..., LENGTH = ...`")]
 pub struct InvalidMap(&'static str);
@@ -30,7 +30,7 @@ impl Map {
     /// Reads the text of a board's `memory.x`, the linker's own file.
     ///
     /// # Errors
-    /// If it lacks one of the two.
+    /// If flash or RAM is missing.
     pub fn parse(text: &str) -> Result<Self, InvalidMap> {
         let length = |name| length(text, name).ok_or(InvalidMap(name));
         Ok(Self {
@@ -51,7 +51,7 @@ fn length(text: &str, region: &str) -> Option<u64> {
     })
 }
 
-/// A number as linker scripts have it: `0x20000`, `131072`, `128K`, `1M`.
+/// A number in the syntax of linker scripts: `0x20000`, `131072`, `128K`, `1M`.
 fn number(text: &str) -> Option<u64> {
     let (digits, unit) = match text.strip_suffix(['K', 'k']) {
         Some(digits) => (digits, 1 << 10),

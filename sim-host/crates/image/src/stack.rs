@@ -1,18 +1,18 @@
-//! How deep the stack can get at worst.
+//! Worst-case stack.
 //!
-//! All code shares one stack. Code of each priority may be interrupted at its deepest by code of the next, and the core saves its
-//! registers in between. The sum over the priorities bounds the stack from above.
+//! All code shares one stack. Code of each priority may be preempted at its deepest point by code of the next priority, and the core
+//! saves its registers at each preemption. The sum over the priorities is an upper bound of the stack.
 //!
 //! Limits of the method:
-//! * The frame of a function is what the compiler states (`-Zemit-stack-sizes`), or the sum of what its instructions take,
-//!   if that is more. A function that the compiler states nothing of (assembly, the compiler's own arithmetic) has that sum.
-//! * A path through the call graph need not be one that a run can take, and a tail call keeps its caller's frame: the
-//!   bound may be too high.
-//! * A call through a pointer is taken to reach the deepest of all functions whose address is somewhere in the image.
-//!   Addresses that are computed by arithmetic would be missed; neither the compiler nor this project makes any.
-//! * Recursion, and code whose use of the stack nobody states, have no bound: they are problems, and the proof fails.
-//! * That an exception does not interrupt one of its own priority is a property of the core; that the priorities are as given
-//!   is the firmware's.
+//! * The frame of a function is the compiler's stack size (`-Zemit-stack-sizes`), or the sum over its instructions if that is
+//!   greater. A function without a stack size (assembly, compiler built-ins) has that sum.
+//! * A path through the call graph may be impossible in a run, and the caller's frame is counted in a tail call: the bound may be
+//!   too high.
+//! * A call through a pointer is assumed to reach the deepest of all functions whose address occurs in the image. Addresses that
+//!   are computed by arithmetic would be missed; neither the compiler nor this project computes any.
+//! * Recursion, and code with unknown stack use, have no bound: they are reported as problems, and the proof fails.
+//! * An exception does not preempt one of the same priority, which is a property of the core. The firmware must have the given
+//!   priorities.
 
 use crate::AnalysisError;
 use crate::budget;
@@ -21,54 +21,54 @@ use crate::memory::address_of;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What the core saves for an exception where the floating-point unit is in use: 8 core registers, 16 of its own, status and a
-/// gap, also when saving is put off until they are used (Arm DDI 0403, B1.5.7).
+/// Exception frame with the floating-point unit in use: 8 core registers, 16 floating-point registers, status and a reserved word,
+/// also with lazy stacking (Arm DDI 0403, B1.5.7).
 const EXCEPTION_FRAME_BYTES: u32 = 4 * (8 + 18);
-/// What it may add to align the stack pointer to 8 bytes.
+/// Maximum padding that aligns the stack pointer to 8 bytes.
 const ALIGNMENT_BYTES: u32 = 4;
 
 /// Code that runs at one priority.
 #[derive(Debug, Clone, Copy)]
 pub struct Priority {
-    /// Name for people.
+    /// Name in reports.
     pub name: &'static str,
-    /// Functions at which it is entered; of several the deepest counts.
+    /// Entry functions; the deepest counts.
     pub entries: &'static [&'static str],
 }
 
 /// The worst stack of one level.
 #[derive(Debug, Clone, Serialize)]
 pub struct Level {
-    /// What runs there.
+    /// The code of the level.
     pub name: &'static str,
-    /// Bytes at worst, without what the core saves.
+    /// Worst-case bytes, without exception frames.
     pub bytes: u32,
-    /// The calls that lead there: function and its frame, bytes.
+    /// The chain of calls: function and frame, bytes.
     pub path: Vec<(String, u32)>,
 }
 
 /// The worst stack of an image.
 #[derive(Debug, Clone, Serialize)]
 pub struct Stack {
-    /// Worst of each level, by rising priority.
+    /// Worst stack of each level, in order of rising priority.
     pub levels: Vec<Level>,
-    /// What the core saves between them, bytes.
+    /// Exception frames between them, bytes.
     pub exception_frames_bytes: u32,
     /// Sum of both, bytes.
     pub worst_bytes: u32,
     /// RAM between the static variables and the top of the stack, bytes.
     pub room_bytes: u32,
-    /// Functions with the compiler's figure, and those of them whose instructions take exactly that.
+    /// Functions with a stack size from the compiler.
     pub stated_functions: usize,
-    /// See there.
+    /// Those whose instructions confirm it exactly.
     pub confirmed_functions: usize,
-    /// Functions without one; their frame is counted from their instructions.
+    /// Functions without one; their frame is computed from their instructions.
     pub counted_functions: usize,
     /// Functions that call through pointers.
     pub indirect_callers: Vec<String>,
-    /// Functions that a pointer may point to.
+    /// Functions whose address is taken.
     pub address_taken: usize,
-    /// Why the figure is no bound; a proof has none.
+    /// Reasons why the sum is not a bound; empty in a proof.
     pub problems: Vec<String>,
 }
 
@@ -76,7 +76,7 @@ impl Stack {
     /// Analyses an image whose code runs at the given priorities, in rising order.
     ///
     /// # Errors
-    /// If it is damaged, was compiled without the functions' frames, or lacks a symbol that every image of the firmware has.
+    /// If it is damaged, was compiled without stack sizes, or lacks a symbol that every image of the firmware has.
     pub fn analyse(bytes: &[u8], priorities: &[Priority]) -> Result<Self, AnalysisError> {
         let graph = CallGraph::read(bytes)?;
         let file = budget::parse(bytes)?;
@@ -85,7 +85,7 @@ impl Stack {
         Self::of(&graph, priorities, room as u32)
     }
 
-    /// Whether the figure is a bound, and there is RAM for it.
+    /// Whether the sum is a bound and fits into the RAM.
     pub fn fits(&self) -> bool {
         self.problems.is_empty() && self.worst_bytes <= self.room_bytes
     }
@@ -128,7 +128,7 @@ fn is_confirmed(function: &Function) -> bool {
     function.stated_bytes == Some(function.counted_bytes)
 }
 
-/// What is called: a function, or whatever a pointer may point to.
+/// A callee: a function, or any function whose address is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Callee {
     Function(u32),
@@ -142,7 +142,7 @@ struct Deepest {
     next: Option<Callee>,
 }
 
-/// A callee whose own are being looked at.
+/// A callee in progress.
 struct Open<'a> {
     callee: Callee,
     own_bytes: u32,
@@ -170,7 +170,7 @@ impl Open<'_> {
 
 struct Search<'a> {
     graph: &'a CallGraph,
-    /// What is known; `None` while a callee is open.
+    /// Results; `None` while a callee is in progress.
     known: BTreeMap<Callee, Option<Deepest>>,
     problems: Vec<String>,
 }
@@ -204,7 +204,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Bytes of stack below the caller. Not by recursion, whose depth would be that of the image.
+    /// Bytes of stack below the caller. Iterative, because the depth of a recursion would depend on the image.
     fn deepest(&mut self, entry: Callee) -> u32 {
         if let Some(Some(known)) = self.known.get(&entry) {
             return known.bytes;
@@ -237,7 +237,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// A callee with its own part, and its problems noted.
+    /// A callee with its own part; its problems are recorded.
     fn open(&mut self, callee: Callee) -> Open<'a> {
         let graph = self.graph;
         self.known.insert(callee, None);
@@ -353,7 +353,7 @@ mod tests {
         assert_eq!(worst(&graph(functions, &[2, 4])).levels[0].bytes, 208);
     }
 
-    /// A hostile image has one in a megabyte.
+    /// A crafted image of one megabyte has a very long chain.
     #[test]
     fn a_chain_of_calls_takes_no_stack_of_this_program() {
         let length = 200_000;

@@ -1,4 +1,4 @@
-//! What a Thumb-2 instruction does to the stack and to the flow of control. All else is of no interest here.
+//! Effect of a Thumb-2 instruction on the stack and on the control flow. Other effects are ignored.
 //!
 //! Encodings after the ARMv7-M Architecture Reference Manual (Arm DDI 0403), chapter A7.
 
@@ -9,24 +9,24 @@ const LR: u32 = 14;
 /// Number of the program counter.
 const PC: u32 = 15;
 
-/// What an instruction does.
+/// Effect of an instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effect {
-    /// Nothing that matters here; also a return, and a branch by a table within the function.
+    /// No relevant effect; includes returns, and table branches within the function.
     None,
-    /// Takes that many bytes of the stack.
+    /// Pushes this number of bytes.
     Push(u32),
-    /// Sets the stack pointer to something that the instruction does not say.
+    /// Sets the stack pointer to a value that the instruction does not contain.
     SetStackPointer,
     /// Calls the function at the address.
     Call(u32),
-    /// Goes on at the address.
+    /// Branches to the address.
     Branch(u32),
-    /// Calls a function, or goes on in one, whose address is in a register or in memory.
+    /// Calls or branches to a function whose address is in a register or in memory.
     Indirect,
-    /// Puts a constant into the lower half of a register and clears the upper one.
+    /// Loads a constant into the lower half of a register and clears the upper half.
     LowHalf(u32, u32),
-    /// Puts a constant into the upper half of a register.
+    /// Loads a constant into the upper half of a register.
     HighHalf(u32, u32),
 }
 

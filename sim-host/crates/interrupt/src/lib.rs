@@ -1,8 +1,8 @@
 #![doc = include_str!("../README.md")]
 //!
 //! A program's signal handler calls [`request`]. Every long loop calls [`check`], which leaves it by unwinding the stack; [`catch`]
-//! ends the unwinding and returns what was interrupted as an error. Results that were complete before are the caller's to keep. So no
-//! function between the loop and the caller needs an error for it, and no loop can be forgotten on the way.
+//! ends the unwinding and returns an error. The caller keeps the results that were complete before. Therefore no function between the
+//! loop and the caller needs an error for the interruption.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,7 +26,7 @@ pub fn requested() -> bool {
     REQUESTED.load(Ordering::Relaxed)
 }
 
-/// Leaves the computation if its end was requested. Costs one load.
+/// Leaves the computation if its end was requested. The cost is one load.
 #[inline]
 pub fn check() {
     if requested() {
@@ -36,7 +36,7 @@ pub fn check() {
 
 #[cold]
 fn leave() -> ! {
-    // Without the panic hook: nothing is wrong, and nothing is printed.
+    // Without the panic hook, because an interruption is not an error and prints nothing.
     resume_unwind(Box::new(Interrupted))
 }
 

@@ -1,26 +1,26 @@
-//! What can come between vehicle and ECU.
+//! Disturbances between vehicle and ECU.
 
 use shared_model::exchange::FrameBytes;
 use shared_model::signal::Measurement;
 
-/// A duty on its way to the servo.
+/// The duty that the servo receives, and its readback.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DutyCodes {
-    /// What the servo is driven with.
+    /// Duty code of the servo.
     pub driven: u16,
-    /// What the ECU captures at the servo's pin.
+    /// Duty code that the ECU captures at the servo's pin.
     pub captured: u16,
 }
 
-/// What comes between vehicle and ECU, PWM period by PWM period; by default nothing. In each period the functions are called
-/// once and in this order; frames are `None` where none was sent.
+/// A disturbance between vehicle and ECU; by default none. In each PWM period the functions are called once and in this order. A
+/// frame is `None` if none was sent.
 pub trait Disturbance {
-    /// The actuator frame on its way to the vehicle.
+    /// The actuator frame that the vehicle receives.
     fn actuator_frame(&mut self, sent: Option<FrameBytes>) -> Option<FrameBytes> {
         sent
     }
 
-    /// The duty that the ECU puts out.
+    /// The duty that the ECU sends.
     fn duty(&mut self, code: u16) -> DutyCodes {
         DutyCodes {
             driven: code,
@@ -28,18 +28,18 @@ pub trait Disturbance {
         }
     }
 
-    /// What the sensors tell, before it is put into a frame: at a control tick only.
-    fn measurement(&mut self, told: Measurement<f32>) -> Measurement<f32> {
-        told
+    /// The measurement before it is encoded as a frame, at control ticks only.
+    fn measurement(&mut self, measured: Measurement<f32>) -> Measurement<f32> {
+        measured
     }
 
-    /// The sensor frame on its way to the ECU.
+    /// The sensor frame that the ECU receives.
     fn sensor_frame(&mut self, sent: Option<FrameBytes>) -> Option<FrameBytes> {
         sent
     }
 }
 
-/// Nothing comes between.
+/// No disturbance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Undisturbed;
 

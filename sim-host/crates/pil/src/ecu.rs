@@ -1,4 +1,4 @@
-//! The ECU that a drive has at its other end, wherever it runs.
+//! The ECU in the loop: model (MIL), software (SIL) or processor (PIL).
 
 use qemu::session::Session;
 use qemu::{Finished, RunError};
@@ -12,24 +12,24 @@ use shared_model::servo::Pwm;
 use shared_model::signal::{Actuation, Measurement};
 use shared_model::{InvalidScenario, Real, Scenario, ecu};
 
-/// Counts a second of an ideal clock.
+/// Rate of an ideal clock, Hz.
 const CLOCK_HZ: u32 = 25_000_000;
 
 /// An ECU in the loop.
 pub trait Ecu {
-    /// One PWM period: `answer` takes what the ECU put out and gives what its pins brought by the period's end.
+    /// One PWM period: `answer` takes the ECU's packet and returns the inputs of its pins at the end of the period.
     ///
     /// # Errors
-    /// If the ECU cannot be reached.
+    /// If the ECU does not answer.
     fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError>;
 }
 
-fn counts_a_tick<T: Real>(scenario: &Scenario<T>) -> u32 {
+fn counts_per_tick<T: Real>(scenario: &Scenario<T>) -> u32 {
     (f64::from(CLOCK_HZ) / scenario.run.control_rate_hz.to_f64()) as u32
 }
 
-/// Model in the loop: controller and gate called by hand, in one channel and one thread, without the ECU's tasks and without
-/// end-to-end protection of what they are told. The check that tasks, channels and frames change nothing.
+/// Model in the loop: controller and gate are called directly, in one channel and one thread, without the ECU's tasks and without
+/// checks of the sensor frames. It verifies that tasks, channels and frames do not change the commands.
 pub struct Model<T> {
     controller: Controller<T>,
     supervisor: Supervisor<T>,
@@ -40,8 +40,8 @@ pub struct Model<T> {
     now: Setpoint<T>,
     next: Option<(Setpoint<T>, FrameBytes)>,
     sender: Sender,
-    counts_a_tick: u32,
-    periods_a_tick: u32,
+    counts_per_tick: u32,
+    periods_per_tick: u32,
     periods: u32,
 }
 
@@ -49,7 +49,7 @@ impl<T: Real> Model<T> {
     /// Controller and gate of a scenario.
     ///
     /// # Errors
-    /// If the scenario is not valid.
+    /// If the scenario is invalid.
     pub fn new(scenario: &Scenario<T>) -> Result<Self, InvalidScenario> {
         scenario.validate()?;
         let pwm = Pwm::new(&scenario.servo, scenario.run.pwm_rate_hz);
@@ -63,8 +63,8 @@ impl<T: Real> Model<T> {
             now: Setpoint::neutral(),
             next: None,
             sender: Sender::new(ACTUATOR_DATA_ID),
-            counts_a_tick: counts_a_tick(scenario),
-            periods_a_tick: scenario.periods_per_tick(),
+            counts_per_tick: counts_per_tick(scenario),
+            periods_per_tick: scenario.periods_per_tick(),
             periods: 0,
         })
     }
@@ -78,9 +78,9 @@ impl<T: Real> Model<T> {
         };
         let command = self
             .measurement
-            .map_or(none, |told| self.controller.run(&told));
+            .map_or(none, |measurement| self.controller.run(&measurement));
         let setpoint = self.supervisor.run(&Observation {
-            elapsed_counts: self.counts_a_tick,
+            elapsed_counts: self.counts_per_tick,
             measurement: new,
             motor_v: command.motor_v,
             dither_amplitude_v: command.dither_amplitude_v,
@@ -102,7 +102,7 @@ impl<T: Real> Model<T> {
 impl<T: Real> Ecu for Model<T> {
     fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
         self.periods += 1;
-        let is_tick = self.periods.is_multiple_of(self.periods_a_tick);
+        let is_tick = self.periods.is_multiple_of(self.periods_per_tick);
         let sample: T = self.oscillator.sample();
         let dither_v = self.now.dither_amplitude_v * sample;
         let duty = self.pwm.duty(self.limiter.run(&self.now, dither_v));
@@ -124,25 +124,25 @@ impl<T: Real> Ecu for Model<T> {
 /// Software in the loop: the ECU's program on the host, in the target's arithmetic.
 pub struct Software {
     ecu: ecu::Ecu<f32>,
-    counts_a_tick: u32,
+    counts_per_tick: u32,
 }
 
 impl Software {
     /// The program of a scenario.
     ///
     /// # Errors
-    /// If the scenario is not valid.
+    /// If the scenario is invalid.
     pub fn new(scenario: &Scenario<f32>) -> Result<Self, InvalidScenario> {
         Ok(Self {
             ecu: ecu::Ecu::new(scenario, CLOCK_HZ)?,
-            counts_a_tick: counts_a_tick(scenario),
+            counts_per_tick: counts_per_tick(scenario),
         })
     }
 }
 
 impl Ecu for Software {
     fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
-        self.ecu.period(answer, || self.counts_a_tick);
+        self.ecu.period(answer, || self.counts_per_tick);
         Ok(())
     }
 }
@@ -154,7 +154,7 @@ pub struct Processor {
 }
 
 impl Processor {
-    /// The firmware of a session that has just begun.
+    /// The firmware of a new session.
     pub fn new(session: Session) -> Self {
         Self {
             session,
@@ -162,12 +162,12 @@ impl Processor {
         }
     }
 
-    /// Counts that the PWM task (at most, in one period) and the control task took, one pair a control tick.
+    /// Counts of the PWM task (the maximum of one period) and of the control task, one pair per control tick.
     pub fn costs(&self) -> &[(u16, u16)] {
         &self.costs
     }
 
-    /// Ends the run, the firmware with it.
+    /// Ends the run and the firmware.
     ///
     /// # Errors
     /// If it does not end.

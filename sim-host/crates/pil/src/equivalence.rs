@@ -1,9 +1,9 @@
-//! Firmware against host, on four levels.
+//! Equivalence of firmware and host, on four levels.
 //!
-//! Two correct simulations of a chaotic system part after some time, so one tolerance over a whole run is the wrong test.
+//! Two correct simulations of a chaotic system diverge, so a single tolerance over a whole run is not a valid test.
 //! 1. *Bits*: the host's f32 run equals the firmware's in every state word and every duty code.
-//! 2. *One step*: from each of the firmware's states, the host's f64 step lands within the rounding of f32.
-//! 3. *Horizon*: free f32 and f64 runs part when the Lyapunov exponent says; on a periodic motion they never do.
+//! 2. *One step*: from each of the firmware's states, the host's f64 step agrees within the rounding of f32.
+//! 3. *Horizon*: free f32 and f64 runs diverge at the time predicted from the Lyapunov exponent; on a periodic orbit they do not.
 //! 4. *Invariants*: exponent, period, bounds and Poincaré set agree within their statistical errors.
 
 use dynamics::lyapunov::Exponent;
@@ -15,21 +15,21 @@ use shared_model::open_loop::OpenLoop;
 use shared_model::vehicle::{State, YAW_RATE};
 use shared_model::{InvalidScenario, Real, Scenario};
 
-/// Free runs count as parted when they are this far apart, over the attractor's size.
+/// Distance at which free runs have diverged, relative to the attractor's size.
 pub const PARTED: f64 = 0.1;
 
-/// Level 1: how many words were compared, and which differ.
+/// Level 1: the number of words compared and of differences.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bits {
     /// State words, friction modes and duty codes compared.
     pub compared: usize,
-    /// How many of them differ; a missing one counts.
+    /// The number of differences; a missing word counts as a difference.
     pub differing: usize,
-    /// The first that differs.
+    /// The first difference.
     pub first: Option<String>,
 }
 
-/// Compares every state word, friction mode and duty code of two f32 runs. NaN equals NaN: its sign is the machine's.
+/// Compares every state word, friction mode and duty code of two f32 runs. NaN equals NaN, because its sign depends on the machine.
 pub fn bits(firmware: &Trace, host: &Trace) -> Bits {
     let mut bits = Bits {
         compared: 0,
@@ -84,14 +84,14 @@ impl Bits {
 /// Level 2: the defect of every step.
 #[derive(Debug, Clone)]
 pub struct OneStep {
-    /// Time (s) and defect over its bound, the greatest of the four components, of each step.
+    /// For each step, the time (s) and the ratio of defect to bound, the greatest of the four components.
     pub ratios: Vec<(f64, f64)>,
-    /// Root mean square of the defects, each over the component's range in the run.
+    /// Root mean square of the defects, each relative to the component's range in the run.
     pub relative_rms: f64,
 }
 
 impl OneStep {
-    /// The greatest defect over its bound.
+    /// The greatest ratio of defect to bound.
     pub fn worst(&self) -> f64 {
         self.ratios
             .iter()
@@ -100,15 +100,15 @@ impl OneStep {
     }
 }
 
-/// As `f64::max`, but a NaN stays.
+/// As `f64::max`, but propagates NaN.
 fn nan_max(a: f64, b: f64) -> f64 {
     if b.is_nan() || b > a { b } else { a }
 }
 
-/// From each of the firmware's states one step in f64, with a bound on the rounding of the same step in f32.
+/// Computes one step in f64 from each of the firmware's states, with a bound on the rounding of the same step in f32.
 ///
 /// # Errors
-/// If the scenario is not valid.
+/// If the scenario is invalid.
 pub fn one_step(scenario: &Scenario<f64>, firmware: &Trace) -> Result<OneStep, InvalidScenario> {
     let mut ecu = OpenLoop::new(&scenario.map(&Rounded::from_f64))?;
     let sizes = sizes(firmware);
@@ -145,7 +145,7 @@ fn sizes(trace: &Trace) -> [f64; 4] {
     })
 }
 
-/// Level 3: distance of two free runs over time (s), the greatest of the components over their ranges.
+/// Level 3: distance of two free runs over time (s), the greatest of the components relative to their ranges.
 pub fn divergence(a: &Trace, b: &Trace) -> Vec<(f64, f64)> {
     let sizes = sizes(a);
     let distance = |(k, (p, q)): (usize, (&State<f64>, &State<f64>))| {
@@ -160,12 +160,12 @@ pub fn divergence(a: &Trace, b: &Trace) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The time (s) at which runs part: the first at which the geometric mean of their distance over a cycle of `cycle_s` is above
-/// [`PARTED`]. Within a cycle the distance swings by some e-folds, of which the exponent knows nothing.
+/// The time (s) at which runs diverge: the first at which the geometric mean of their distance over a cycle of `cycle_s` exceeds
+/// [`PARTED`]. Within a cycle the distance varies by some e-folds, which the exponent does not describe.
 pub fn parted_at_s(divergence: &[(f64, f64)], cycle_s: f64) -> Option<f64> {
     let step_s = divergence.first()?.0;
     let cycle = (cycle_s / step_s).round().max(1.0) as usize;
-    // The least distance that counts: runs that are equal have none.
+    // Equal runs have distance 0, whose logarithm is not finite.
     let logarithm = |&(_, distance): &(f64, f64)| distance.max(f64::MIN_POSITIVE).ln();
     let limit = cycle as f64 * PARTED.ln();
     let mut sum = 0.0;
@@ -184,13 +184,12 @@ pub fn parted_at_s(divergence: &[(f64, f64)], cycle_s: f64) -> Option<f64> {
     None
 }
 
-/// When free f32 and f64 runs are expected to part: least, expected and greatest time, s.
+/// Predicted time at which free f32 and f64 runs diverge: least, expected and greatest, s.
 ///
-/// Each step adds an error of relative size e in a random direction, and errors grow with the exponent L. After some 1/L
-/// seconds the sum has the size e/sqrt(2 L h) times exp(L t), h being the step. Over a time T the logarithm of the growth
-/// scatters by sqrt(D T), with D = (standard error)^2 times the length of the motion that the exponent was taken over. The
-/// interval is that of three standard deviations, found where the growth, that many deviations fast or slow, reaches
-/// [`PARTED`].
+/// Each step adds an error of relative size e in a random direction, and errors grow with the exponent L. After about 1/L
+/// seconds the sum has the size e/sqrt(2 L h) times exp(L t), where h is the step. Over a time T the logarithm of the growth
+/// scatters by sqrt(D T), with D = (standard error)^2 times the length of the trajectory of the exponent. The interval is that of
+/// three standard deviations: it ends where the growth, faster or slower by three deviations, reaches [`PARTED`].
 pub fn horizon_s(exponent: &Exponent, relative_rms: f64, step_s: f64) -> [f64; 3] {
     let rate = exponent.per_s;
     let start = relative_rms / (2.0 * rate * step_s).sqrt();
@@ -203,16 +202,16 @@ pub fn horizon_s(exponent: &Exponent, relative_rms: f64, step_s: f64) -> [f64; 3
     })
 }
 
-/// Level 4: how far the yaw rate's extremes of the firmware's run are from those of equally long pieces of the host's long
-/// run, in units of what is allowed: four standard deviations of the pieces, and 1e-4 of the range for rounding.
+/// Level 4: distance of the yaw rate's extremes in the firmware's run from those of equally long segments of the host's long run,
+/// relative to the tolerance: four standard deviations of the segments, plus 1e-4 of the range for rounding.
 pub fn bounds_distance(firmware: &Trace, from: usize, host: &Trace, host_from: usize) -> f64 {
     let length = firmware.states.len() - from;
     let (low, high) = host.range(YAW_RATE, host_from);
     let gamma: Vec<f64> = host.component(YAW_RATE).skip(host_from).collect();
     let extremes = |pick: fn(f64, f64) -> f64, start: f64| -> Vec<f64> {
-        let pieces = gamma.chunks_exact(length);
-        pieces
-            .map(|piece| piece.iter().copied().fold(start, pick))
+        let segments = gamma.chunks_exact(length);
+        segments
+            .map(|segment| segment.iter().copied().fold(start, pick))
             .collect()
     };
     let (own_low, own_high) = firmware.range(YAW_RATE, from);
@@ -228,8 +227,8 @@ fn distance(value: f64, sample: &[f64], range: f64) -> f64 {
     (value - mean).abs() / (4.0 * variance.sqrt() + 1e-4 * range)
 }
 
-/// Level 4: distance of the yaw rate's maxima as distributions (Kolmogorov and Smirnov's two-sample statistic), and its
-/// critical value at a level of 0.1 %. For chaotic motions, whose maxima hardly depend on each other.
+/// Level 4: distance of the distributions of the yaw rate's maxima (two-sample Kolmogorov-Smirnov statistic), and its critical value
+/// at a significance of 0.1 %. For chaotic trajectories, whose maxima are almost independent.
 pub fn poincare_distance(
     firmware: &Trace,
     from: usize,
@@ -255,8 +254,8 @@ pub fn poincare_distance(
     (apart.fold(0.0, nan_max), 1.949 * ((n + m) / (n * m)).sqrt())
 }
 
-/// Level 4: the furthest that a maximum of the firmware's yaw rate is from the nearest of the host's, over the yaw rate's
-/// range. For periodic motions, whose maxima are a few points.
+/// Level 4: the greatest distance of a maximum of the firmware's yaw rate from the nearest of the host's, relative to the yaw rate's
+/// range. For periodic orbits, whose maxima are a few points.
 pub fn poincare_points_distance(
     firmware: &Trace,
     from: usize,

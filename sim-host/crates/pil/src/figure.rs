@@ -1,4 +1,4 @@
-//! A manoeuvre in the loop against time: what the vehicle does and what the ECU commands.
+//! Chart of a manoeuvre in the loop over time: states of the vehicle and commands of the ECU.
 
 use crate::closed_loop::Run;
 use crate::record::Record;
@@ -76,7 +76,7 @@ pub fn draw(title: &str, run: &Run) -> String {
     )
 }
 
-/// When the ECU fell into its safe state, if it did.
+/// The time at which the ECU entered its safe state, if it did.
 fn safe_from_s(run: &Run) -> Option<f64> {
     let is_safe = |actuation: &Option<_>| {
         actuation.is_some_and(|actuation: shared_model::signal::Actuation<f32>| {

@@ -1,14 +1,14 @@
-//! Instructions that the ECU's tasks take, counted by the emulator. They are no cycles of silicon.
+//! Instructions of the ECU's tasks, counted by the emulator. They are not cycles of a real core.
 
 use qemu::Machine;
 use qemu::telemetry::Recording;
 use shared_model::{Real, Scenario};
 use std::collections::BTreeMap;
 
-/// Instructions, and how often: ascending.
+/// Number of instructions and its frequency, in ascending order.
 pub type Histogram = Vec<(u32, u64)>;
 
-/// What the two tasks of a run took.
+/// Instructions of both tasks in a run.
 #[derive(Debug, Clone, Default)]
 pub struct Instructions {
     /// The control task.
@@ -35,17 +35,17 @@ impl Instructions {
         }
     }
 
-    /// Of a run in the loop, from the counts that the PWM task (at most, in one period) and the control task took: one pair a control
-    /// tick. On a machine whose timers all have the clock that they are said to have.
+    /// Of a run in the loop, from the counts of the PWM task (the maximum of one period) and of the control task, one pair per control
+    /// tick. All timers of the machine must have their nominal clock.
     pub fn in_loop<T: Real>(
         costs: &[(u16, u16)],
         scenario: &Scenario<T>,
         machine: Machine,
     ) -> Self {
         let rate_hz = machine.instruction_rate_hz();
-        // The tasks are counted with the clock of the PWM's timer.
-        let instructions_a_count = rate_hz / machine.timer_clock_hz();
-        let count = |counts: u16| (f64::from(counts) * instructions_a_count).round() as u32;
+        // The costs are counted with the clock of the PWM timer.
+        let instructions_per_count = rate_hz / machine.timer_clock_hz();
+        let count = |counts: u16| (f64::from(counts) * instructions_per_count).round() as u32;
         Self {
             control: histogram(costs.iter().map(|&(_, control)| count(control))),
             pwm: histogram(costs.iter().map(|&(pwm, _)| count(pwm))),
@@ -54,7 +54,7 @@ impl Instructions {
         }
     }
 
-    /// Share of its time that the core is busy with both tasks where each is at its worst; above 1 there is not enough.
+    /// Worst-case load of the core by both tasks; above 1 the core is overloaded.
     pub fn worst_share(&self) -> f64 {
         let pwm = f64::from(self.periods_a_tick) * f64::from(most(&self.pwm));
         (f64::from(most(&self.control)) + pwm) / self.tick
@@ -69,12 +69,12 @@ fn histogram(instructions: impl Iterator<Item = u32>) -> Histogram {
     histogram.into_iter().collect()
 }
 
-/// The greatest number of instructions; 0 of none.
+/// The greatest number of instructions; 0 if there are none.
 pub fn most(histogram: &[(u32, u64)]) -> u32 {
     histogram.last().map_or(0, |&(count, _)| count)
 }
 
-/// The number that half of all do not exceed; 0 of none.
+/// The median number of instructions; 0 if there are none.
 pub fn median(histogram: &[(u32, u64)]) -> u32 {
     let total: u64 = histogram.iter().map(|&(_, times)| times).sum();
     let mut seen = 0;

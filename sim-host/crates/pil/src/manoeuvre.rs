@@ -1,8 +1,7 @@
-//! Manoeuvres: what driver and road do, and how good the sensors are, as files.
+//! Manoeuvres as files: driver, wheel speed and sensors.
 //!
-//! A manoeuvre's file is a configuration like any other (a preset and what differs from it), with a table `[manoeuvre]` for
-//! what the vehicle's parameters do not say. The dither's waveform, frequency and start are the configuration's; its amplitude
-//! is the ECU's to choose.
+//! A manoeuvre's file is a configuration (a preset and the parameters that differ from it) with an additional table `[manoeuvre]`. The
+//! configuration gives the dither's waveform, frequency and start; the ECU chooses its amplitude.
 
 use super::profile::{InvalidProfile, Profile};
 use super::sensor::SensorSettings;
@@ -15,11 +14,11 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Key of the manoeuvre's own table in a file.
+/// Key of the manoeuvre's table in a file.
 const TABLE: &str = "manoeuvre";
-/// Keys of the configuration that a manoeuvre says itself.
+/// Keys of the configuration that the manoeuvre's profiles replace.
 const OWN: [(&str, &str); 2] = [("run", "wheel_speed_rpm"), ("steering", "motor_current_a")];
-/// Range of the wheel speed, rpm, and of the current request, A: those of the scenario's own parameters.
+/// Ranges of the wheel speed (rpm) and the current request (A), equal to those of the scenario's parameters.
 pub(super) const SPEED_RANGE_RPM: (f64, f64) = (1.0, 1e5);
 const CURRENT_RANGE_A: (f64, f64) = (-1000.0, 1000.0);
 
@@ -31,18 +30,18 @@ pub struct RequestSine {
     pub amplitude_a: f64,
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Time at which it sets in, at phase zero, s.
+    /// Start time, at phase zero, s.
     pub start_time_s: f64,
 }
 
 impl RequestSine {
-    /// Its share of the request at `time_s`, A.
+    /// Its contribution to the request at `time_s`, A.
     pub fn at(&self, time_s: f64) -> f64 {
         let since_s = time_s - self.start_time_s;
         if since_s <= 0.0 {
             return 0.0;
         }
-        // By libm, so that every machine has the same bits.
+        // From libm, which gives the same bits on every machine.
         self.amplitude_a * Real::sin(TAU * (self.frequency_hz * since_s).fract())
     }
 }
@@ -79,18 +78,18 @@ pub struct Manoeuvre {
     pub name: String,
     /// Wheel speed N over time, rpm, from 1 to 100000.
     pub wheel_speed_rpm: Profile,
-    /// Motor current that the driver asks for over time, A, from -1000 to 1000.
+    /// Motor current that the driver requests over time, A, from -1000 to 1000.
     pub current_request_a: Profile,
-    /// A sine on top of it.
+    /// A sine added to it.
     pub current_request_sine: Option<RequestSine>,
-    /// The vehicle keeps to the wheel speed limit that the ECU demands, and changes its speed by no more than this, rpm/s, up
-    /// to 1e6; it follows a steeper profile late. With 0, as without it, it follows its profile and heeds no limit.
+    /// Greatest rate of change of the wheel speed, rpm/s, up to 1e6, for a vehicle that obeys the wheel speed limit of the ECU; it
+    /// follows a steeper profile with a lag. With 0 (the default) the vehicle follows its profile and ignores the limit.
     #[serde(default)]
     pub obey_speed_limit_rpm_per_s: f64,
-    /// What is wrong with the sensors.
+    /// Errors of the sensors.
     #[serde(default)]
     pub sensors: SensorSettings,
-    /// How the servo tells torque and dither apart.
+    /// The servo's separation of torque and dither.
     #[serde(default)]
     pub servo_filter: ServoFilter,
 }
@@ -109,7 +108,7 @@ impl Manoeuvre {
         }
     }
 
-    /// Motor current that the driver asks for at `time_s`, A.
+    /// Motor current that the driver requests at `time_s`, A.
     pub fn current_request_at(&self, time_s: f64) -> f64 {
         let sine = self.current_request_sine;
         self.current_request_a.at(time_s) + sine.map_or(0.0, |sine| sine.at(time_s))
@@ -126,7 +125,7 @@ impl Manoeuvre {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first fault found.
+    /// The first invalid number.
     pub fn validate(&self) -> Result<(), InvalidManoeuvre> {
         let profile = |name, profile: &Profile, (min, max)| {
             let checked = profile.validate(min, max);
@@ -161,13 +160,13 @@ fn validate_rate(rpm_per_s: f64) -> Result<(), OutOfRange> {
     })
 }
 
-/// Why a manoeuvre cannot be driven.
+/// An invalid manoeuvre.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InvalidManoeuvre {
     /// A number is not finite or not in its range.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
-    /// A profile over time is none.
+    /// A profile over time is invalid.
     #[error("manoeuvre.{name}, {source}")]
     Profile {
         /// Name in the file.
@@ -177,35 +176,37 @@ pub enum InvalidManoeuvre {
     },
 }
 
-/// Why a manoeuvre's file cannot be used.
+/// An error of reading a manoeuvre's file.
 #[derive(Debug, thiserror::Error)]
 pub enum ManoeuvreError {
-    /// The file, or what it says of the scenario.
+    /// The file or its scenario is invalid.
     #[error(transparent)]
     Config(#[from] ConfigError),
     /// The file has no manoeuvre.
-    #[error("no table [{TABLE}]: must be there beside the configuration")]
+    #[error(
+        "no table [{TABLE}]: a manoeuvre's file must contain one in addition to the configuration"
+    )]
     Missing,
-    /// The manoeuvre's table has an unknown key, lacks one, or has a value of the wrong kind.
+    /// The manoeuvre's table has an unknown or missing key, or a value of the wrong type.
     #[error("[{TABLE}]: {0}")]
     Table(#[source] Box<toml::de::Error>),
-    /// A key of the configuration that the manoeuvre says itself.
-    #[error("{section}.{name}: must be left out, the manoeuvre's profile says it")]
-    SaidTwice {
+    /// A key of the configuration that the manoeuvre's profile replaces.
+    #[error("{section}.{name}: must be omitted, because the manoeuvre's profile gives it")]
+    GivenTwice {
         /// The key's table.
         section: &'static str,
         /// The key.
         name: &'static str,
     },
-    /// The manoeuvre cannot be driven.
+    /// The manoeuvre is invalid.
     #[error(transparent)]
     Invalid(#[from] InvalidManoeuvre),
 }
 
-/// Reads a manoeuvre's file: the scenario at the manoeuvre's start, and the manoeuvre, both checked.
+/// Reads a manoeuvre's file: the scenario at the manoeuvre's start, and the manoeuvre, both validated.
 ///
 /// # Errors
-/// If the file cannot be read, has an unknown key or lacks one, or a number is not in its range.
+/// If the file cannot be read, has an unknown or missing key, or a number is out of range.
 pub fn load(path: &Path) -> Result<(Scenario<f64>, Manoeuvre), ManoeuvreError> {
     parse(config::read(path)?)
 }
@@ -231,7 +232,7 @@ fn parse(mut file: Table) -> Result<(Scenario<f64>, Manoeuvre), ManoeuvreError> 
             .and_then(|table: &Value| table.get(name))
             .is_some()
         {
-            return Err(ManoeuvreError::SaidTwice { section, name });
+            return Err(ManoeuvreError::GivenTwice { section, name });
         }
     }
     let scenario = manoeuvre.begin(&config::over_preset(file, None)?);

@@ -1,4 +1,4 @@
-//! The plant: servo, steering and vehicle under the duty that the ECU puts out.
+//! The plant: servo, steering and vehicle, driven by the ECU's duty.
 
 use super::manoeuvre::{InvalidManoeuvre, Manoeuvre, SPEED_RANGE_RPM};
 use super::record::Record;
@@ -11,25 +11,25 @@ use shared_model::steering::Steering;
 use shared_model::vehicle::{Model, SIDESLIP, STEERING_ANGLE, STEERING_RATE, State, YAW_RATE};
 use shared_model::{InvalidScenario, Scenario, integrate};
 
-/// Least resistance of the winding, ohm, at which a voltage still says something of the current.
+/// Least resistance of the winding at which the voltage determines the current, ohm.
 const MIN_RESISTANCE_OHM: f64 = 1e-3;
 
-/// Why there is no plant.
+/// An invalid plant.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InvalidPlant {
-    /// The scenario cannot be run.
+    /// The scenario is invalid.
     #[error(transparent)]
     Scenario(#[from] InvalidScenario),
-    /// The manoeuvre cannot be driven.
+    /// The manoeuvre is invalid.
     #[error(transparent)]
     Manoeuvre(#[from] InvalidManoeuvre),
 }
 
 /// The vehicle on its manoeuvre, in f64, stepped at the PWM rate.
 ///
-/// The servo sees the mean voltage of each period, not the carrier's ripple. The slow part of it drives the motor current
-/// through the winding's resistance (back-EMF and inductance are left out, as in the paper's constant current); the rest is
-/// the dither, which enters ahead of the nonlinearities and is held over the period.
+/// The input of the servo is the mean voltage of each period, without the carrier's ripple. Its slow part drives the motor current
+/// through the winding's resistance (back-EMF and inductance are neglected, as in the paper's constant current). The remainder is
+/// the dither, which is added to the argument of the nonlinearities and held over the period.
 #[derive(Debug, Clone)]
 pub struct Plant {
     scenario: Scenario<f64>,
@@ -41,7 +41,7 @@ pub struct Plant {
     rad_per_volt: f64,
     wheel_speed_rpm: f64,
     wheel_speed_limit_rpm: f64,
-    /// PWM periods gone by.
+    /// Number of completed PWM periods.
     periods: u64,
     duty: Duty,
     parts: Parts,
@@ -52,7 +52,7 @@ impl Plant {
     /// manoeuvre's initial request.
     ///
     /// # Errors
-    /// If scenario or manoeuvre are not valid, or the servo's winding has no resistance.
+    /// If the scenario or the manoeuvre is invalid, or the servo's winding has no resistance.
     pub fn new(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Result<Self, InvalidPlant> {
         manoeuvre.validate()?;
         let scenario = manoeuvre.begin(scenario);
@@ -85,7 +85,7 @@ impl Plant {
         })
     }
 
-    /// Moves through one PWM period under `duty`, which must be one of this plant's PWM.
+    /// Integrates over one PWM period under `duty`, which must be of this plant's PWM.
     pub fn step(&mut self, duty: Duty) {
         let period_s = 1.0 / self.scenario.run.pwm_rate_hz;
         self.duty = duty;
@@ -105,11 +105,11 @@ impl Plant {
 
     fn change_speed(&mut self, period_s: f64) {
         let profile_rpm = self.manoeuvre.wheel_speed_rpm.at(self.time_s());
-        let most_rpm = self.manoeuvre.obey_speed_limit_rpm_per_s * period_s;
-        self.wheel_speed_rpm = if most_rpm > 0.0 {
-            let wanted_rpm = profile_rpm.min(self.wheel_speed_limit_rpm);
-            let change_rpm = wanted_rpm - self.wheel_speed_rpm;
-            self.wheel_speed_rpm + change_rpm.clamp(-most_rpm, most_rpm)
+        let max_change_rpm = self.manoeuvre.obey_speed_limit_rpm_per_s * period_s;
+        self.wheel_speed_rpm = if max_change_rpm > 0.0 {
+            let target_rpm = profile_rpm.min(self.wheel_speed_limit_rpm);
+            let change_rpm = target_rpm - self.wheel_speed_rpm;
+            self.wheel_speed_rpm + change_rpm.clamp(-max_change_rpm, max_change_rpm)
         } else {
             profile_rpm
         };
@@ -118,7 +118,7 @@ impl Plant {
             .set_wheel_speed_rpm(vehicle, self.wheel_speed_rpm);
     }
 
-    /// Takes the ECU's wheel speed limit, rpm; heeded if the manoeuvre says so.
+    /// Sets the ECU's wheel speed limit, rpm; the manoeuvre determines whether the vehicle obeys it.
     pub fn set_wheel_speed_limit_rpm(&mut self, limit_rpm: f64) {
         self.wheel_speed_limit_rpm = limit_rpm.max(SPEED_RANGE_RPM.0);
     }
@@ -160,7 +160,7 @@ impl Plant {
         self.model.slip_angles(&self.state.x).0
     }
 
-    /// What ideal sensors would tell now, and what the driver asks for.
+    /// The present outputs of ideal sensors, and the driver's request.
     pub fn truth(&self) -> Measurement<f64> {
         let x = &self.state.x;
         Measurement {
@@ -172,7 +172,7 @@ impl Plant {
         }
     }
 
-    /// The present moment, for recording.
+    /// The present state, for recording.
     pub fn record(&self) -> Record {
         let truth = self.truth();
         Record {

@@ -1,26 +1,26 @@
-//! A quantity that is given over time.
+//! A quantity as a function of time.
 
 use dynamics::words::Short;
 use serde::Deserialize;
 
-/// Straight lines between knots `[time (s), value]`; constant before the first and behind the last. Two knots of one time are
-/// a step, from the first's value to the second's.
+/// Linear interpolation between knots `[time (s), value]`; constant before the first and after the last. Two knots at the same time
+/// are a step from the first value to the second.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(transparent)]
 pub struct Profile {
     knots: Vec<(f64, f64)>,
 }
 
-/// Why a profile is none.
+/// An invalid profile.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum InvalidProfile {
     /// It has no knots.
     #[error("no knots: must have at least one, [time (s), value]")]
     Empty,
-    /// A time is not finite, or before the knot ahead of it.
+    /// A time is not finite, or less than that of the preceding knot.
     #[error("knot {number} at {} s: must be a finite time, not before {} s", Short(*.time_s), Short(*.min_s))]
     Time {
-        /// Which knot, from 1.
+        /// Number of the knot, from 1.
         number: usize,
         /// Its time, s.
         time_s: f64,
@@ -30,7 +30,7 @@ pub enum InvalidProfile {
     /// A value is not finite or not in the quantity's range.
     #[error("knot {number} = {}: must be a finite number from {} to {}", Short(*.value), Short(*.min), Short(*.max))]
     Value {
-        /// Which knot, from 1.
+        /// Number of the knot, from 1.
         number: usize,
         /// Its value.
         value: f64,
@@ -49,10 +49,10 @@ impl Profile {
         }
     }
 
-    /// Checks that times ascend from 0 or later, and that all values are from `min` to `max`.
+    /// Checks that the times ascend from 0 or later, and that all values are from `min` to `max`.
     ///
     /// # Errors
-    /// The first fault found.
+    /// The first invalid knot.
     pub fn validate(&self, min: f64, max: f64) -> Result<(), InvalidProfile> {
         let mut min_s = 0.0;
         for (number, &(time_s, value)) in (1..).zip(&self.knots) {
@@ -63,7 +63,7 @@ impl Profile {
                     min_s,
                 });
             }
-            // NaN is in no range.
+            // Rejects NaN too.
             if !(min..=max).contains(&value) {
                 return Err(InvalidProfile::Value {
                     number,
@@ -80,8 +80,8 @@ impl Profile {
         Ok(())
     }
 
-    /// The value at `time_s`; at a step that behind it. NaN if the profile has no knots, which
-    /// [`validate`](Self::validate) refuses.
+    /// The value at `time_s`; at a step, the value after it. NaN if the profile has no knots, which
+    /// [`validate`](Self::validate) rejects.
     pub fn at(&self, time_s: f64) -> f64 {
         let next = self.knots.partition_point(|&(knot_s, _)| knot_s <= time_s);
         match (self.knots[..next].last(), self.knots.get(next)) {

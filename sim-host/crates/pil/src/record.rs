@@ -1,9 +1,9 @@
-//! A manoeuvre as it was driven, for tables and figures.
+//! The recorded vehicle, for tables and figures.
 
 use serde::Serialize;
 use shared_model::friction::FrictionMode;
 
-/// The plant at one moment.
+/// The plant at one time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Record {
     /// Time from the manoeuvre's start, s.
@@ -21,9 +21,9 @@ pub struct Record {
     /// Mode of the dry friction.
     #[serde(serialize_with = "lower_case")]
     pub friction_mode: FrictionMode,
-    /// Motor current that the driver asks for, A.
+    /// Motor current that the driver requests, A.
     pub current_request_a: f64,
-    /// Motor current in the PWM period that ends here, A.
+    /// Motor current of the last PWM period, A.
     pub motor_current_a: f64,
     /// Dither ahead of the nonlinearities in that period, rad.
     pub dither_rad: f64,

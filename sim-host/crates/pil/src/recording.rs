@@ -1,7 +1,7 @@
-//! A recorded run: all that passed between ECU and vehicle, with the scenario, to be replayed without an emulator.
+//! A recorded run: the scenario and all packets between ECU and vehicle, for replay without an emulator.
 //!
-//! The file: a magic number, the ECU's scenario as TOML behind its length, the number of PWM periods, two packets a period,
-//! and a CRC-32 over everything before it. Numbers are little-endian.
+//! The file contains a magic number, the length of the ECU's scenario as TOML, the scenario, the number of PWM periods, two packets
+//! per period, and a CRC-32 of all preceding bytes. Numbers are little-endian.
 
 use super::closed_loop::Exchange;
 use super::ecu::{Ecu, Software};
@@ -19,32 +19,32 @@ const CHECKSUM_LEN: usize = 4;
 pub struct Recording {
     /// The ECU's scenario.
     pub scenario: Scenario<f32>,
-    /// What passed, one a PWM period.
+    /// One exchange per PWM period.
     pub exchanges: Vec<Exchange>,
 }
 
-/// Why a file is no recording.
+/// An error of reading a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordingError {
-    /// The file does not begin as one.
-    #[error("is no recording of the loop; `sim-host pil --record FILE` makes one")]
+    /// The magic number is missing.
+    #[error("is not a recording of the loop; create one with `sim-host pil --record FILE`")]
     NoRecording,
-    /// A bit was changed, or the file is cut short.
-    #[error("is damaged or cut short: its check sum does not fit; record it again")]
+    /// The file is damaged or truncated.
+    #[error("is damaged or truncated: its checksum is wrong; record it again")]
     Damaged,
     /// The scenario in it cannot be read.
     #[error("has a scenario that this version cannot read: {0}")]
     Scenario(String),
-    /// The scenario in it is not valid.
+    /// The scenario in it is invalid.
     #[error("has a scenario that cannot be run: {0}")]
     Invalid(#[from] shared_model::InvalidScenario),
 }
 
 impl Recording {
-    /// Writes it.
+    /// Writes the recording.
     ///
     /// # Errors
-    /// If `writer` does not take it.
+    /// If `writer` fails.
     pub fn write(&self, writer: &mut impl Write) -> std::io::Result<()> {
         let text = toml::to_string(&self.scenario).map_err(std::io::Error::other)?;
         let mut bytes = MAGIC.to_vec();
@@ -59,10 +59,10 @@ impl Recording {
         writer.write_all(&bytes)
     }
 
-    /// Reads it back.
+    /// Reads a recording.
     ///
     /// # Errors
-    /// If the bytes are no recording, or damaged, or its scenario is not valid.
+    /// If the bytes are not a recording or are damaged, or the scenario is invalid.
     pub fn read(bytes: &[u8]) -> Result<Self, RecordingError> {
         use RecordingError::{Damaged, NoRecording};
         let body = bytes.strip_prefix(MAGIC).ok_or(NoRecording)?;
@@ -87,10 +87,10 @@ impl Recording {
         })
     }
 
-    /// What the ECU's program on this host puts out when it is told what was recorded.
+    /// Runs the ECU's program on this host with the recorded inputs.
     ///
     /// # Errors
-    /// If the scenario is not valid.
+    /// If the scenario is invalid.
     pub fn replay(&self) -> Result<Vec<Exchange>, RecordingError> {
         let mut ecu = Software::new(&self.scenario)?;
         let mut replayed = Vec::with_capacity(self.exchanges.len());

@@ -1,4 +1,4 @@
-//! The sensors: what of the vehicle's motion reaches the ECU.
+//! The sensors: resolution, noise and delay.
 
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -8,10 +8,10 @@ use shared_model::parameter::{Field, OutOfRange, ParameterSet};
 use shared_model::signal::Measurement;
 use std::collections::VecDeque;
 
-/// Most control ticks that a measurement may be late.
+/// Maximum delay of a measurement, control ticks.
 const MAX_DELAY_TICKS: usize = 100;
 
-/// One number for each sensor, in its unit.
+/// One value per sensor, in its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PerSensor {
@@ -55,15 +55,15 @@ impl ParameterSet<f64> for PerSensor {
     ];
 }
 
-/// What is wrong with the sensors. By default nothing: they are ideal.
+/// Errors of the sensors. By default the sensors are ideal.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SensorSettings {
-    /// Resolution: the step to whose multiples a sensor rounds; 0 rounds nothing.
+    /// Resolution: a sensor rounds to multiples of it; 0 means no rounding.
     pub resolution: PerSensor,
-    /// Standard deviation of the white, normally distributed noise ahead of that rounding.
+    /// Standard deviation of the white Gaussian noise before rounding.
     pub noise: PerSensor,
-    /// Control ticks by which the whole measurement is late, up to 100. The first one is repeated until then.
+    /// Delay of the whole measurement, control ticks, up to 100. The first measurement is repeated until then.
     pub delay_ticks: usize,
     /// Seed of the noise.
     pub seed: u64,
@@ -73,7 +73,7 @@ impl SensorSettings {
     /// Checks every number.
     ///
     /// # Errors
-    /// The first that is not in its range.
+    /// The first number that is out of range.
     pub fn validate(&self) -> Result<(), OutOfRange> {
         self.resolution
             .validate_as("manoeuvre.sensors.resolution")?;
@@ -107,14 +107,14 @@ impl SensorSettings {
 ///     steering_rate_rad_per_s: 0.0,
 ///     current_request_a: 10.0,
 /// };
-/// let told = [0.6, 1.1, 1.6].map(|rate| sensors.sample(&truth(rate)).yaw_rate_rad_per_s);
-/// assert_eq!(told, [0.5, 0.5, 1.0]);
+/// let measured = [0.6, 1.1, 1.6].map(|rate| sensors.sample(&truth(rate)).yaw_rate_rad_per_s);
+/// assert_eq!(measured, [0.5, 0.5, 1.0]);
 /// ```
 #[derive(Debug, Clone)]
 pub struct Sensors {
     settings: SensorSettings,
     generator: Pcg64Mcg,
-    /// Measurements on their way, the oldest first.
+    /// Delayed measurements, the oldest first.
     late: VecDeque<Measurement<f32>>,
 }
 
@@ -128,10 +128,10 @@ impl Sensors {
         }
     }
 
-    /// What the ECU is told at a control tick at which `truth` is so. The driver's request is no sensor's: it is as late as the
-    /// rest, but neither noisy nor rounded.
+    /// The measurement that the ECU receives at a control tick with the true values `truth`. The driver's request has the same delay,
+    /// but neither noise nor rounding.
     pub fn sample(&mut self, truth: &Measurement<f64>) -> Measurement<f32> {
-        let now = self.measure(truth).map(&as_told);
+        let now = self.measure(truth).map(&to_f32);
         if self.late.is_empty() {
             self.late.resize(self.settings.delay_ticks, now);
         }
@@ -144,7 +144,7 @@ impl Sensors {
             resolution, noise, ..
         } = self.settings;
         let mut sense = |value, noise, resolution| {
-            // Drawn for ideal sensors too, so that one sensor's noise does not depend on whether another has any.
+            // Drawn for ideal sensors too, so that the noise of one sensor does not depend on that of another.
             let normal: f64 = StandardNormal.sample(&mut self.generator);
             rounded(value + noise * normal, resolution)
         };
@@ -182,8 +182,8 @@ fn rounded(value: f64, resolution: f64) -> f64 {
     }
 }
 
-/// As a sensor tells it: no sensor has the numbers so near zero that f32 holds them with fewer digits.
-fn as_told(value: f64) -> f32 {
-    let told = value as f32;
-    if told.is_subnormal() { 0.0 } else { told }
+/// Rounds to f32; a subnormal result becomes 0, because no sensor resolves it.
+fn to_f32(value: f64) -> f32 {
+    let rounded = value as f32;
+    if rounded.is_subnormal() { 0.0 } else { rounded }
 }

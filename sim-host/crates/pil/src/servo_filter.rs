@@ -1,32 +1,32 @@
-//! What of the servo's voltage turns the motor, and what shakes it.
+//! Separation of the servo's voltage into torque and dither.
 
 use shared_model::parameter::{Field, ParameterSet};
 
-/// Parameters of the servo's separation of torque and dither. The paper has none; these are assumed.
+/// Parameters of the separation of torque and dither. The paper gives none; these are assumptions.
 ///
-/// A low corner keeps the square wave square, a high one keeps the driver out of the dither. Measured at a PWM of 10 kHz
-/// (gains, shares in the torque and leakage of the default by a test):
+/// A low corner frequency preserves the square wave, a high one reduces leakage of the driver's request into the dither. Values at a
+/// PWM rate of 10 kHz (a test checks gains, torque shares and leakage of the default):
 ///
 /// | corner, rad/s | 40 | 100 (default) | 200 |
 /// |---|---|---|---|
 /// | square of 2000 rad/s: rms gain | 0.9998 | 0.9990 | 0.9958 |
-/// | its droop about the mean, either way | 3.7 % | 8.7 % | 16.5 % |
+/// | its droop about the mean, in both directions | 3.7 % | 8.7 % | 16.5 % |
 /// | its greatest share in the torque's voltage | 3.7 % | 8.7 % | 16.5 % |
 /// | sine of 4000 rad/s: rms gain | 0.99995 | 0.9997 | 0.9988 |
 /// | its greatest share in the torque's voltage | 1.0 % | 2.5 % | 4.9 % |
-/// | swing of the yaw rate at 1750 rpm, by the filter: square of 0.1 V | -0.12 % | -0.03 % | +0.37 % |
+/// | effect on the peak-to-peak yaw rate at 1750 rpm: square of 0.1 V | -0.12 % | -0.03 % | +0.37 % |
 /// | the same: sine of 1.0 V | +0.01 % | +0.07 % | +0.28 % |
 /// | leakage of a ramp of 10 A/s (3 V/s) into the dither | 75 mV | 30 mV | 15 mV |
 ///
-/// The swing is that of the smoothed yaw rate against a corner of 1 rad/s. A step leaks whole at any corner, and fades with the
-/// corner's time constant: a square dither's 1 rad/V makes 3 V an angle that only the limit keeps small.
+/// The peak-to-peak value is that of the smoothed yaw rate, relative to a corner of 1 rad/s. A step leaks completely at any corner and
+/// decays with its time constant. At the 1 rad/V of a square dither, a step of 3 V is an angle that only the limit keeps small.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ServoFilter {
     /// Corner of the low-pass for the torque and of the high-pass for the dither, rad/s.
     pub corner_rad_per_s: f64,
-    /// Greatest angle that the dither adds ahead of the nonlinearities, rad: beyond it volts are no longer an angle. A step
-    /// of the motor's voltage passes the high-pass whole, and would else be an angle of several rad.
+    /// Limit of the angle that the dither adds to the argument of the nonlinearities, rad. A step of the motor's voltage passes the
+    /// high-pass completely, and would be an angle of several rad without the limit.
     pub dither_limit_rad: f64,
 }
 
@@ -57,25 +57,25 @@ impl ParameterSet<f64> for ServoFilter {
     ];
 }
 
-/// The two parts of the servo's voltage in one PWM period, each its mean over the period. Their sum is the voltage.
+/// Both parts of the servo's voltage, as means over a PWM period. Their sum is the voltage.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parts {
-    /// What drives the motor current, V.
+    /// The part that drives the motor current, V.
     pub torque_v: f64,
-    /// What acts as dither, V.
+    /// The part that acts as dither, V.
     pub dither_v: f64,
 }
 
-/// A first-order low-pass and its complement, exact for a voltage that is held over each period.
+/// A first-order low-pass and its complement, exact for a voltage that is constant over each period.
 #[derive(Debug, Clone, Copy)]
 pub struct Separation {
     voltage_v: f64,
-    /// The high-pass's output at the period's end, V. Kept in place of the low-pass's, so that under a constant voltage it
-    /// fades to nothing rather than to the voltage's last bits.
+    /// Output of the high-pass at the end of the period, V. Stored instead of the low-pass's output, so that it decays to zero
+    /// under a constant voltage, without a rounding residue.
     dither_v: f64,
-    /// What is left of it after a period.
+    /// Decay factor over a period.
     decay: f64,
-    /// Its mean over a period, in units of its value at the period's start.
+    /// Its mean over a period, relative to its value at the start of the period.
     mean: f64,
 }
 

@@ -53,7 +53,7 @@ fn drive(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u64 {
     u64::from(periods / scenario.periods_per_tick())
 }
 
-/// Drives all drives round by round, each round with noise of its own, until there are that many ticks.
+/// Runs all loops repeatedly, with different noise each time, until the number of ticks is reached.
 fn assert_no_false_alarm(least_ticks: u64) {
     let drives = drives();
     let noisy = drives

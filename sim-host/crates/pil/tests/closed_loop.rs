@@ -121,9 +121,9 @@ fn the_vehicle_is_held_until_the_request_is_reached() {
     );
 }
 
-/// Noise, coarse sensors and delays change what the ECU is told, and so do its commands only where they must.
+/// MIL and SIL agree under noise, coarse sensors and delays, which change the inputs of the ECU.
 #[test]
-fn every_level_on_the_host_agrees_whatever_the_sensors() {
+fn mil_and_sil_agree_with_any_sensors() {
     for file in [
         "low-resolution-noise.toml",
         "delay-2.toml",

@@ -319,7 +319,7 @@ fn refusals_name_field_value_and_bounds() {
         ),
         (
             replace("[run]", "[run]\nwheel_speed_rpm = 1600.0"),
-            vec!["run.wheel_speed_rpm", "left out"],
+            vec!["run.wheel_speed_rpm", "omitted"],
         ),
         (
             replace("waveform", "wave_form"),

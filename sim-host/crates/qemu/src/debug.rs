@@ -1,4 +1,4 @@
-//! A run that is watched and steered from outside: the emulator with its gdb stub and its machine protocol.
+//! A run under a debugger: the emulator with its gdb stub and its machine protocol.
 
 use crate::emulator::Emulator;
 use crate::gdb::Gdb;
@@ -23,11 +23,11 @@ pub struct Debugged {
 }
 
 impl Debugged {
-    /// Starts an image as [`run::run`] does, but the core waits before its first instruction. No request to it may take
-    /// longer than `limit`.
+    /// Starts an image as [`run::run`] does, with the core stopped before its first instruction. `limit` is the time limit of each
+    /// request.
     ///
     /// # Errors
-    /// If the emulator is missing, fails, or is not there in time.
+    /// If the emulator is missing, fails, or does not start in time.
     pub fn start(
         image: &Image,
         machine: Machine,
@@ -52,7 +52,7 @@ impl Debugged {
         })
     }
 
-    /// Leaves the core alone and sees the run to its end. Until then the log waits in a pipe: some hundred lines fit.
+    /// Detaches from the core and waits for the end of the run. Until then the log is in a pipe, which holds some hundred lines.
     ///
     /// # Errors
     /// As [`run::run`].

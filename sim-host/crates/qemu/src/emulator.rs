@@ -1,8 +1,8 @@
-//! The emulator's process and everything it starts: ended together, and read no longer than it runs.
+//! The emulator's process and its children: they are ended together, and their pipes end with the emulator.
 //!
 //! The program called `qemu-system-arm` may be a wrapper whose child is the emulator, or leave a process behind that keeps
-//! its pipes open. So it gets a process group of its own, which is killed as a whole, and its pipes end when it ends.
-//! The group does not receive the terminal's Ctrl-C; whoever waits here reads the flag that Ctrl-C sets.
+//! its pipes open. It is therefore in a separate process group, which is killed as a whole, and its pipes end when it ends.
+//! The group does not receive the terminal's Ctrl-C; waiting functions here read the flag that Ctrl-C sets.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// How often a reader looks whether the emulator has ended.
+/// Interval at which a reader checks whether the emulator has ended.
 const POLL: Duration = Duration::from_millis(20);
 
 /// A running emulator, ended when dropped.
@@ -26,7 +26,7 @@ pub(crate) struct Emulator {
 }
 
 impl Emulator {
-    /// Starts it in a process group of its own. Its standard output and error are to be pipes.
+    /// Starts the emulator in a separate process group. Its standard output and error must be pipes.
     pub(crate) fn spawn(command: &mut Command) -> io::Result<Self> {
         command.process_group(0);
         end_with_parent(command);
@@ -57,7 +57,7 @@ impl Emulator {
         }
     }
 
-    /// How it ended, if it has; whatever it left behind is then ended too.
+    /// The emulator's status if it has ended; its remaining children are then ended too.
     pub(crate) fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
         if self.status.is_none() {
             let only_look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
@@ -69,7 +69,7 @@ impl Emulator {
     }
 
     fn end(&mut self) -> io::Result<()> {
-        // Before the child is waited for: until then no other group can have its number. Fails if all have ended already.
+        // Before waiting for the child, so that no other group can have its number. Fails if all have already ended.
         let _ = kill_process_group(self.group, Signal::KILL);
         self.status = Some(self.child.wait()?);
         self.ended.store(true, Ordering::Release);
@@ -80,13 +80,13 @@ impl Emulator {
 impl Drop for Emulator {
     fn drop(&mut self) {
         if self.status.is_none() {
-            // There is nothing more that could be done about it.
+            // A failure cannot be handled any further.
             let _ = self.end();
         }
     }
 }
 
-/// Has the kernel end the emulator should this program be killed, when no destructor runs.
+/// Makes the kernel end the emulator if this program is killed, when no destructor runs.
 fn end_with_parent(command: &mut Command) {
     // SAFETY: between fork and exec only async-signal-safe calls are allowed, and prctl is one.
     unsafe {
@@ -97,11 +97,11 @@ fn end_with_parent(command: &mut Command) {
     }
 }
 
-/// A pipe from the emulator. It ends with the emulator, after what was in it by then, whoever else holds its other end.
+/// A pipe from the emulator. It ends with the emulator, after its remaining content, even if another process holds its other end.
 pub(crate) struct Pipe<P> {
     pipe: P,
     ended: Arc<AtomicBool>,
-    /// Bytes to come, once the emulator has ended.
+    /// Remaining bytes after the emulator has ended.
     left: Option<usize>,
 }
 
@@ -140,13 +140,13 @@ pub(crate) fn is_ready(file: &impl AsFd, flags: PollFlags, limit: Duration) -> i
     }
 }
 
-/// Reads a stream to its end and gives its first bytes as text: what a program that fails says at once.
+/// Reads a stream to its end and returns its first bytes as text: the message of a program that fails.
 pub(crate) fn first_words(mut stream: impl Read) -> String {
-    /// Most bytes that are kept.
+    /// Maximum number of bytes stored.
     const KEPT: usize = 16 * 1024;
     let mut kept = Vec::new();
     let mut buffer = [0; 4096];
-    // What could be read before an error is all there is to show.
+    // After an error, the bytes read so far are returned.
     while let Ok(length @ 1..) = stream.read(&mut buffer) {
         let room = KEPT - kept.len();
         kept.extend_from_slice(&buffer[..length.min(room)]);
@@ -186,7 +186,7 @@ mod tests {
         assert_eq!(bytes.len(), 50_000);
     }
 
-    /// A process in a session of its own is in no group that could be killed, and holds the pipe for a minute.
+    /// A process in a separate session is not in the killed group, and holds the pipe for a minute.
     #[test]
     fn a_pipe_ends_with_the_emulator_whoever_holds_it() {
         let start = Instant::now();

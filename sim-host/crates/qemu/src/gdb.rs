@@ -1,27 +1,26 @@
-//! The emulator's gdb stub: stops the core, looks into it and changes it, over the remote serial protocol.
+//! The emulator's gdb stub: stops, reads and changes the core over the remote serial protocol.
 //!
-//! QEMU takes a stopped core for an idle one (seen in 7.2), and idle time is skipped: at each stop the virtual time jumps to the
-//! next timer interrupt, which is then due at once. Data stay what they are, but a run with many stops has less time between
-//! its interrupts; a stop where the core would idle anyway costs nothing. Protocol: the GDB manual, appendix "GDB Remote
-//! Serial Protocol".
+//! QEMU treats a stopped core as idle (observed in 7.2), and idle time is skipped: at each stop the virtual time advances to the next
+//! timer interrupt, which is then due immediately. Data are unchanged, but a run with many stops has less time between its interrupts.
+//! A stop while the core would be idle has no effect. Protocol: the GDB manual, appendix "GDB Remote Serial Protocol".
 
 use crate::socket::{LONGEST_LINE, Socket, SocketError};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
-/// In single steps interrupts wait and timers stand: a step past a breakpoint else enters the interrupt that the stop has made
-/// due, and the core comes back to the breakpoint without having passed it.
+/// Disables interrupts and timers in single steps. Otherwise a step past a breakpoint enters the interrupt that the stop has made
+/// due, and the core returns to the breakpoint without having passed it.
 const STEP_ALONE: &str = "Qqemu.sstep=7";
-/// Size of a Thumb breakpoint as the protocol has it, bytes.
+/// Size of a Thumb breakpoint in the protocol, bytes.
 const THUMB_BREAKPOINT: u32 = 2;
 
-/// Why the core stands still.
+/// Reason why the core has stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stop {
     /// At a breakpoint.
     Breakpoint,
-    /// The program has ended with this exit code, of which the protocol has the low 8 bits, and the emulator with it.
+    /// The program and the emulator have ended with this exit code, of which the protocol contains the low 8 bits.
     Exited(u8),
 }
 
@@ -41,7 +40,7 @@ pub enum Register {
 }
 
 impl Register {
-    /// Its number in the protocol. The status is behind eight registers of an older floating-point unit.
+    /// Its number in the protocol. The status follows eight registers of an older floating-point unit.
     fn number(self) -> u8 {
         match self {
             Self::R(index) => index,
@@ -61,18 +60,18 @@ pub struct Gdb {
 }
 
 impl Gdb {
-    /// Connects to the stub at the local socket `path`, which may come up only within `limit`; no later request waits longer
-    /// for its answer either. The core stands still from then on.
+    /// Connects to the stub at the local socket `path` and stops the core. `limit` is the time limit of the connection and of each
+    /// later request.
     ///
     /// # Errors
-    /// If there is no stub in time.
+    /// If the stub does not answer in time.
     pub fn connect(path: &Path, limit: Duration) -> Result<Self, SocketError> {
         let socket = Socket::connect(path, limit)?;
         let mut gdb = Self {
             socket,
             breakpoints: BTreeSet::new(),
         };
-        // The emulator gives single registers only to those who know their description.
+        // The emulator allows access to single registers only after a request for their description.
         let description = gdb.request("qXfer:features:read:target.xml:0,fff")?;
         if !description.starts_with(['l', 'm']) {
             return Err(SocketError::NotUnderstood(description));
@@ -84,30 +83,30 @@ impl Gdb {
     /// Stops the core whenever it is about to execute the instruction at `address`.
     ///
     /// # Errors
-    /// If the stub refuses or does not answer.
+    /// If the stub rejects the request or does not answer.
     pub fn set_breakpoint(&mut self, address: u32) -> Result<(), SocketError> {
         self.acknowledged(&format!("Z1,{address:x},{THUMB_BREAKPOINT}"))?;
         self.breakpoints.insert(address);
         Ok(())
     }
 
-    /// Takes a breakpoint away.
+    /// Removes a breakpoint.
     ///
     /// # Errors
-    /// If the stub refuses or does not answer.
+    /// If the stub rejects the request or does not answer.
     pub fn remove_breakpoint(&mut self, address: u32) -> Result<(), SocketError> {
         self.acknowledged(&format!("z1,{address:x},{THUMB_BREAKPOINT}"))?;
         self.breakpoints.remove(&address);
         Ok(())
     }
 
-    /// Lets the core go on until it stops by itself, for at most `limit` of the host's time.
+    /// Runs the core until it stops, for at most `limit` of the host's time.
     ///
     /// # Errors
-    /// If it does not stop in time. It then runs on, and only dropping the emulator ends it.
+    /// If it does not stop in time. It then continues until the emulator is dropped.
     pub fn run_to_stop(&mut self, limit: Duration) -> Result<Stop, SocketError> {
         let here = self.read_register(Register::Pc)?;
-        // A breakpoint right here would stop the core again at once.
+        // A breakpoint at this address would stop the core again immediately.
         if self.breakpoints.contains(&here) {
             self.remove_breakpoint(here)?;
             let stop = self.go("s", limit)?;
@@ -135,7 +134,7 @@ impl Gdb {
         }
     }
 
-    /// Reads `length` bytes of memory or of a device's registers, as the core sees them.
+    /// Reads `length` bytes of memory or of a device's registers, as the core reads them.
     ///
     /// # Errors
     /// If nothing is mapped there, or the stub does not answer.
@@ -150,7 +149,7 @@ impl Gdb {
         }
     }
 
-    /// Writes memory, flash included. The emulator ignores writes to a device's registers.
+    /// Writes memory, including flash. The emulator ignores writes to a device's registers.
     ///
     /// # Errors
     /// If nothing is mapped there, or the stub does not answer.
@@ -179,13 +178,13 @@ impl Gdb {
         self.acknowledged(&format!("P{:x}={value}", register.number()))
     }
 
-    /// Takes all breakpoints away, lets the core go on and leaves it alone.
+    /// Removes all breakpoints, resumes the core and detaches.
     ///
     /// # Errors
-    /// If the stub refuses or does not answer.
+    /// If the stub rejects the request or does not answer.
     pub fn detach(mut self) -> Result<(), SocketError> {
         match self.acknowledged("D") {
-            // The core goes on before the stub answers: a program at its end takes the connection with it.
+            // The core continues before the stub answers, so a program that ends closes the connection.
             Err(SocketError::Lost(_)) => Ok(()),
             other => other,
         }
@@ -203,7 +202,7 @@ impl Gdb {
         self.receive()
     }
 
-    /// Sends a packet and waits until the stub has taken it.
+    /// Sends a packet and waits for its acknowledgement.
     fn send(&mut self, content: &str) -> Result<(), SocketError> {
         let packet = format!("${content}#{:02x}", checksum(content.as_bytes()));
         self.socket.write(packet.as_bytes())?;
@@ -213,7 +212,7 @@ impl Gdb {
         }
     }
 
-    /// Receives a packet and takes it.
+    /// Receives a packet and acknowledges it.
     fn receive(&mut self) -> Result<String, SocketError> {
         let mut content = Vec::new();
         let mut is_inside = false;

@@ -1,17 +1,17 @@
 //! The firmware's log: defmt frames on its console, decoded with the image's symbols.
 //!
-//! The console is that of a program which may be any, so nothing that comes over it takes memory without bound.
+//! The image may be any program, so the memory for the console's content is bounded.
 
 use defmt_decoder::{DecodeError, Table};
 use image::Image;
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Longest frame, bytes; the firmware's have some hundred.
+/// Maximum frame length, bytes; the firmware's frames have some hundred.
 const FRAME_BYTES: usize = 4096;
-/// Longest line that is shown, characters.
+/// Maximum length of a line, characters.
 const LINE_CHARACTERS: usize = 4096;
-/// Lines that are kept, the last ones.
+/// Number of last lines that are stored.
 const LINES: usize = 1000;
 const DAMAGED: &str = "(a damaged log line)";
 
@@ -21,8 +21,10 @@ pub enum LogError {
     /// The symbols are damaged.
     #[error("the image's defmt symbols are damaged{}", .0.as_deref().map_or(String::new(), |reason| format!(": {reason}")))]
     Damaged(Option<String>),
-    /// Its frames have no ends.
-    #[error("the image's log has no ends of frames; build it with defmt's encoding rzcobs")]
+    /// Its frames are not delimited.
+    #[error(
+        "the frames of the image's log are not delimited; build the image with defmt's encoding rzcobs"
+    )]
     Encoding,
 }
 
@@ -32,7 +34,7 @@ pub struct LogDecoder {
 }
 
 impl LogDecoder {
-    /// The decoder for an image's log. An image without defmt symbols has a log that nobody can read.
+    /// The decoder for an image's log. Without defmt symbols the log is not readable.
     ///
     /// # Errors
     /// If the image's defmt symbols are damaged or of a version or encoding that this program cannot read.
@@ -52,12 +54,12 @@ impl LogDecoder {
         Ok(Self { table })
     }
 
-    /// Whether the log can be read; not so in an image whose symbols were stripped.
+    /// Whether the log is readable; it is not if the image's symbols were stripped.
     pub fn is_readable(&self) -> bool {
         self.table.is_some()
     }
 
-    /// Reads the console to its end; `on_line` sees each line of the log, if it can be read.
+    /// Reads the console to its end; `on_line` is called with each line of the log, if it is readable.
     pub fn decode(&self, mut console: impl std::io::Read, mut on_line: impl FnMut(&str)) {
         let mut buffer = [0; 4096];
         let mut frame = Vec::with_capacity(FRAME_BYTES);
@@ -81,9 +83,9 @@ impl LogDecoder {
     }
 }
 
-/// A frame with its zero; several zeros in a row are the end of one.
+/// A frame with its terminating zero; consecutive zeros end one frame.
 fn decode_frame(table: &Table, frame: &[u8], on_line: &mut impl FnMut(&str)) {
-    // A frame of other symbols can make the crate panic.
+    // A frame for other symbols can make the crate panic.
     let line = catch_unwind(AssertUnwindSafe(|| {
         let mut decoder = table.new_stream_decoder();
         decoder.received(frame);

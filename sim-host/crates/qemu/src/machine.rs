@@ -7,7 +7,7 @@ pub enum Machine {
     Mps2An386,
     /// Cortex-M7.
     Mps2An500,
-    /// STM32F405, a Cortex-M4F, with timers that are those of the chip.
+    /// STM32F405, a Cortex-M4F, with the timers of the chip.
     NetduinoPlus2,
 }
 
@@ -15,7 +15,7 @@ impl Machine {
     /// All machines.
     pub const ALL: [Self; 3] = [Self::Mps2An386, Self::Mps2An500, Self::NetduinoPlus2];
 
-    /// The emulator's name of it.
+    /// Its name in the emulator.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mps2An386 => "mps2-an386",
@@ -24,7 +24,7 @@ impl Machine {
         }
     }
 
-    /// Clock of the PWM's timer that the board's firmware has, Hz.
+    /// Clock of the PWM timer in the board's firmware, Hz.
     pub fn timer_clock_hz(self) -> f64 {
         match self {
             Self::Mps2An386 | Self::Mps2An500 => 25e6,
@@ -32,7 +32,7 @@ impl Machine {
         }
     }
 
-    /// The emulator's options for a host on `line` at the UART that the board's firmware links it with.
+    /// The emulator's options that connect `line` to the UART of the board's firmware.
     pub(crate) fn serial_options(self, line: &str) -> Vec<&str> {
         match self {
             // UART 0 is the console; UART 1 is the link.
@@ -49,7 +49,7 @@ impl Machine {
         }
     }
 
-    /// The firmware's board whose images run on it.
+    /// The firmware's board for this machine.
     pub fn board(self) -> &'static str {
         match self {
             Self::Mps2An386 | Self::Mps2An500 => "mps2",
@@ -57,8 +57,8 @@ impl Machine {
         }
     }
 
-    /// Virtual time is counted in instructions, and idle time is skipped: the same run every time. An instruction takes 2^5
-    /// ns; on the STM32F405 2^3 ns, because its timers run some ten times faster than the program believes.
+    /// Options for a repeatable run: virtual time is counted in instructions, and idle time is skipped. An instruction takes 2^5 ns. On
+    /// the STM32F405 it takes 2^3 ns, because its emulated timers run about ten times faster than their nominal clock.
     pub(crate) fn instruction_shift(self) -> u32 {
         match self {
             Self::Mps2An386 | Self::Mps2An500 => 5,
@@ -66,7 +66,7 @@ impl Machine {
         }
     }
 
-    /// Instructions that it executes in a second of its time.
+    /// Instructions per second of virtual time.
     pub fn instruction_rate_hz(self) -> f64 {
         1e9 / f64::from(1 << self.instruction_shift())
     }

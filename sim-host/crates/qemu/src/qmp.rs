@@ -1,4 +1,4 @@
-//! The emulator's machine protocol (QMP): looks at the machine from outside, past the core.
+//! The emulator's machine protocol (QMP): access to the machine without the core.
 
 use crate::socket::{Socket, SocketError};
 use serde_json::{Value, json};
@@ -12,11 +12,10 @@ pub struct Qmp {
 }
 
 impl Qmp {
-    /// Connects to the emulator at the local socket `path`, which may come up only within `limit`; no later request waits
-    /// longer for its answer either.
+    /// Connects to the emulator at the local socket `path`. `limit` is the time limit of the connection and of each later request.
     ///
     /// # Errors
-    /// If there is no emulator in time.
+    /// If the emulator does not answer in time.
     pub fn connect(path: &Path, limit: Duration) -> Result<Self, SocketError> {
         let socket = Socket::connect(path, limit)?;
         let mut qmp = Self { socket };
@@ -28,10 +27,10 @@ impl Qmp {
         Ok(qmp)
     }
 
-    /// Executes a command of the protocol and gives what it returns.
+    /// Executes a command of the protocol and returns its result.
     ///
     /// # Errors
-    /// If the emulator refuses it or does not answer.
+    /// If the emulator rejects it or does not answer.
     pub fn execute(&mut self, command: &str, arguments: Value) -> Result<Value, SocketError> {
         let request = json!({"execute": command, "arguments": arguments}).to_string();
         self.socket.write(request.as_bytes())?;
@@ -44,11 +43,11 @@ impl Qmp {
                 let answer = error.to_string();
                 return Err(SocketError::Refused { request, answer });
             }
-            // Anything else is an event, which nobody here waits for.
+            // Anything else is an event, which is ignored.
         }
     }
 
-    /// Executes a line of the emulator's own monitor and gives what it prints.
+    /// Executes a line of the emulator's monitor and returns its output.
     ///
     /// # Errors
     /// If the emulator does not answer.
@@ -65,7 +64,7 @@ impl Qmp {
     pub fn read_word(&mut self, address: u32) -> Result<u32, SocketError> {
         let line = format!("xp /1xw {address:#x}");
         let printed = self.monitor(&line)?;
-        // As in `0000000040000434: 0x000004e2`.
+        // For example `0000000040000434: 0x000004e2`.
         let word = printed.trim().rsplit_once(": 0x").map(|(_, digits)| digits);
         let word = word.and_then(|digits| u32::from_str_radix(digits, 16).ok());
         word.ok_or(SocketError::Refused {

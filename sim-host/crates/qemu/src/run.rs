@@ -1,4 +1,4 @@
-//! The emulator: starts an image with its settings, shows its log, and ends with it.
+//! A run of an image in the emulator, from start to end, with its settings and its log.
 
 use crate::emulator::{Emulator, first_words};
 use crate::log::{Lines, LogDecoder, LogError};
@@ -13,13 +13,13 @@ use std::time::{Duration, Instant};
 /// The emulator's program.
 const PROGRAM: &str = "qemu-system-arm";
 const POLL: Duration = Duration::from_millis(5);
-/// In the last log line of every image that ends with exit code 0 (`firmware/src/app.rs`).
+/// Part of the last log line of every image that ends with exit code 0 (`firmware/src/app.rs`).
 const COMPLETE: &str = "run complete";
 
-/// Why a run could not be made.
+/// An error of a run.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
-    /// The emulator is not there.
+    /// The emulator is missing.
     #[error(
         "{PROGRAM} is not installed; run `cargo xtask setup`, or install QEMU for Arm (Debian: apt-get install qemu-system-arm)"
     )]
@@ -32,10 +32,10 @@ pub enum RunError {
     TimedOut {
         /// The time-out.
         limit: Duration,
-        /// What it said last.
+        /// The last log line.
         last_line: String,
     },
-    /// The user asked to stop.
+    /// The user interrupted the run.
     #[error("interrupted")]
     Interrupted,
     /// The emulator itself failed.
@@ -46,19 +46,19 @@ pub enum RunError {
     EmulatorFailed {
         /// How it ended: its exit code, or the signal that ended it.
         status: ExitStatus,
-        /// What it said.
+        /// Its message.
         message: String,
     },
-    /// Something ended well that is not the firmware.
+    /// A program other than the firmware ended with exit code 0.
     #[error(
         "{PROGRAM} ended with exit code 0, but without the firmware's last log line, {COMPLETE:?} (the last one was: \
          {last_line}); check that the image is one of this firmware and that `{PROGRAM} --version` is QEMU"
     )]
     NotComplete {
-        /// What came last.
+        /// The last line.
         last_line: String,
     },
-    /// The image has no symbols for its log, without which nobody can say whether its run was complete.
+    /// The image has no symbols for its log, which shows whether the run was complete.
     #[error(
         "the image has no defmt symbols, so its log cannot be read; give the ELF that `cargo xtask firmware` builds, not a \
          stripped one"
@@ -75,21 +75,21 @@ pub enum RunError {
     LinkLost {
         /// Its exit code; none if the core locked up.
         exit_code: Option<i32>,
-        /// What it said last.
+        /// The last log line.
         last_line: String,
     },
-    /// The log's symbols cannot be read.
+    /// The log's symbols are invalid.
     #[error("cannot decode the firmware's log: {0}")]
     Log(#[from] LogError),
-    /// The emulator cannot be watched or steered from outside.
-    #[error("cannot steer {PROGRAM}: {0}")]
+    /// The emulator cannot be debugged.
+    #[error("cannot debug {PROGRAM}: {0}")]
     NotSteered(#[from] SocketError),
 }
 
 /// A finished run.
 #[derive(Debug, Clone)]
 pub struct Finished {
-    /// The firmware's exit code. It is 0 only if the log says that the run is complete, or cannot be read.
+    /// The firmware's exit code. It is 0 only if the log confirms that the run is complete, or is not readable.
     pub exit_code: i32,
     /// The last lines of its log.
     pub log: Vec<String>,
@@ -98,7 +98,7 @@ pub struct Finished {
 /// The firmware's exit code when records were lost or a task was late.
 pub const OVERRUN: i32 = 12;
 
-/// What the firmware's exit code means.
+/// The meaning of the firmware's exit code.
 pub fn meaning(exit_code: i32) -> &'static str {
     match exit_code {
         0 => "the run is complete",
@@ -114,12 +114,11 @@ pub fn meaning(exit_code: i32) -> &'static str {
     }
 }
 
-/// Runs an image with the given settings in `directory`, where its telemetry goes; `on_line` sees its log as it comes.
+/// Runs an image with the given settings in `directory`, into which it writes its telemetry. `on_line` is called with each log line.
 ///
 /// # Errors
-/// If the emulator is missing or fails, or the image has no readable log, or the firmware does not end within `limit`, or
-/// something ends with exit code 0 that has not logged the end of a run. A firmware that ends with an exit code of its own is
-/// a finished run.
+/// If the emulator is missing or fails, the image has no readable log, the firmware does not end within `limit`, or exit code 0 comes
+/// without the log line of a complete run. A firmware that ends with another exit code is a finished run.
 pub fn run(
     image: &Image,
     machine: Machine,
@@ -137,7 +136,7 @@ pub fn run(
     )
 }
 
-/// As [`run`], with a decoder that may be one that cannot read the log; then exit code 0 is all that is known of a run.
+/// As [`run`], but also without a readable log. The exit code alone then determines the outcome.
 ///
 /// # Errors
 /// As [`run`].
@@ -154,7 +153,7 @@ pub fn run_with(
     attend(emulator, decoder, limit, on_line)
 }
 
-/// Sees a run to its end.
+/// Waits for the end of a run.
 pub(crate) fn attend(
     mut emulator: Emulator,
     decoder: &LogDecoder,
@@ -174,7 +173,7 @@ pub(crate) fn attend(
         });
         let errors = scope.spawn(|| first_words(errors));
         let ended = wait(&mut emulator, limit);
-        // Ends the pipes, and with them the two readers.
+        // Closes the pipes, which ends both readers.
         drop(emulator);
         let log = log.join().expect("the log's reader does not panic");
         let message = errors.join().expect("the errors' reader does not panic");
@@ -189,7 +188,7 @@ pub(crate) fn attend(
 /// Options of an emulator without serial lines.
 pub(crate) const SILENT: &[&str] = &["-serial", "none"];
 
-/// Starts the emulator; `options` are more of its own.
+/// Starts the emulator with additional `options`.
 pub(crate) fn start(
     image: &Image,
     machine: Machine,
@@ -199,7 +198,7 @@ pub(crate) fn start(
 ) -> Result<Emulator, RunError> {
     let mut semihosting = String::from("enable=on,target=native,arg=firmware");
     for setting in settings {
-        // A comma ends an option of the emulator, two are one.
+        // A comma ends an option of the emulator; a double comma is a literal one.
         semihosting += &format!(",arg={}", setting.replace(',', ",,"));
     }
     let image = std::path::absolute(&image.path).map_err(RunError::NotStarted)?;
@@ -227,7 +226,7 @@ pub(crate) fn start(
     }
 }
 
-/// `None` if the time is over.
+/// `None` after a time-out.
 pub(crate) fn wait(
     emulator: &mut Emulator,
     limit: Duration,
@@ -245,7 +244,7 @@ pub(crate) fn wait(
     Ok(None)
 }
 
-/// Judges a run whose emulator has ended.
+/// Determines the outcome of a run whose emulator has ended.
 pub(crate) fn finish(
     status: ExitStatus,
     log: Vec<String>,

@@ -1,4 +1,4 @@
-//! The ECU in the emulator, one exchange a PWM period: how a host stands in for its servo and sensors.
+//! The ECU in the emulator with one exchange per PWM period: the host replaces its servo and sensors.
 
 use crate::emulator::{Emulator, first_words, is_ready};
 use crate::log::{Lines, LogDecoder};
@@ -19,25 +19,25 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// Names of the pipes in the working directory, as the firmware has them.
+/// Names of the pipes in the working directory, as in the firmware.
 const TO_HOST: &str = "to-host";
 const TO_ECU: &str = "to-ecu";
 const UART_SOCKET: &str = "uart";
 const POLL: Duration = Duration::from_millis(2);
-/// Longest wait without a look at the user's wish to stop.
+/// Longest wait between two checks for an interruption.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// In the emulator's message where it gives up because a fault came within the handler of a fault.
+/// Part of the emulator's message when a fault occurs within a fault handler (lockup).
 const LOCKUP: &str = "Lockup";
 
-/// What carries the exchange.
+/// Link for the exchange.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkKind {
-    /// Pipes, read and written by the emulator; the host says when a PWM period begins: fast.
+    /// Pipes, read and written by the emulator. The host starts each PWM period: fast.
     Files,
-    /// The same, but the board's timer says when a PWM period begins, and the gate measures the time between control ticks.
+    /// The same, but the board's timer starts each PWM period, and the gate measures the time between control ticks.
     Timed,
-    /// The board's UART, framed, at the host's pace: realistic and slow.
+    /// The board's UART, framed, with the host's timing: realistic and slow.
     Uart,
 }
 
@@ -54,7 +54,7 @@ impl LinkKind {
         }
     }
 
-    /// What carries the exchange, for people.
+    /// Its description in the help.
     pub fn description(self) -> &'static str {
         match self {
             Self::Files => "pipes at the host's pace: fast",
@@ -68,14 +68,14 @@ impl LinkKind {
     }
 }
 
-/// Both directions of the link, neither of which blocks, and what finds packets where they are framed.
+/// Both directions of the link, non-blocking, and the deframer.
 struct Transport {
     from_ecu: File,
     to_ecu: File,
     deframer: Option<Deframer>,
 }
 
-/// An ECU in the emulator that waits for its vehicle. The emulator ends when this is dropped.
+/// An ECU in the emulator that waits for the vehicle's answer. Dropping it ends the emulator.
 pub struct Session {
     transport: Transport,
     attended: Attended,
@@ -99,7 +99,7 @@ impl Attended {
         let log = thread::spawn(move || {
             let mut lines = Lines::default();
             decoder.decode(console, |line| {
-                *seen.lock().expect("nobody panics with it") = line.to_owned();
+                *seen.lock().expect("no thread panics while it is locked") = line.to_owned();
                 lines.push(line);
             });
             lines.into_vec()
@@ -113,7 +113,10 @@ impl Attended {
     }
 
     fn last_line(&self) -> String {
-        let last_line = self.last_line.lock().expect("nobody panics with it");
+        let last_line = self
+            .last_line
+            .lock()
+            .expect("no thread panics while it is locked");
         last_line.clone()
     }
 
@@ -124,19 +127,19 @@ impl Attended {
         }
     }
 
-    /// Waits for the end, at most `limit`: how the emulator ended, the log, and the emulator's own message.
+    /// Waits for the end, at most `limit`. Returns the emulator's status, the log, and the emulator's message.
     fn end(&mut self, limit: Duration) -> Result<(ExitStatus, Vec<String>, String), RunError> {
         let Some(status) = run::wait(&mut self.emulator, limit)? else {
             return Err(self.timed_out(limit));
         };
-        // The readers come to their end with the emulator.
+        // The readers end with the emulator.
         let (log, errors) = self.readers.take().expect("a run ends once");
         let log = log.join().expect("the log's reader does not panic");
         let message = errors.join().expect("the errors' reader does not panic");
         Ok((status, log, message))
     }
 
-    /// Why the link broke off: how the emulator ended.
+    /// The reason why the link was lost: the emulator's status.
     fn left(&mut self, limit: Duration) -> RunError {
         let exit_code = match self.end(limit) {
             Ok((status, _, message)) if status.code().is_none() && message.contains(LOCKUP) => None,
@@ -191,19 +194,19 @@ impl Session {
         })
     }
 
-    /// What the ECU puts out in its next PWM period. It then waits for [`send`](Self::send).
+    /// Receives the ECU's packet of the next PWM period. The ECU then waits for [`send`](Self::send).
     ///
     /// # Errors
-    /// If the emulator has ended, or nothing comes within the limit.
+    /// If the emulator has ended, or sends nothing within the limit.
     pub fn receive(&mut self) -> Result<ToHost, RunError> {
         let received = self.transport.receive(self.limit);
         received.map_err(|error| self.lost(&error))
     }
 
-    /// Answers what was received.
+    /// Sends the answer.
     ///
     /// # Errors
-    /// If the emulator has ended, or takes nothing within the limit.
+    /// If the emulator has ended, or reads nothing within the limit.
     pub fn send(&mut self, answer: &ToEcu) -> Result<(), RunError> {
         let sent = self.transport.send(answer, self.limit);
         sent.map_err(|error| self.lost(&error))
@@ -217,17 +220,17 @@ impl Session {
         }
     }
 
-    /// Waits for the firmware to end, which it does once it was told to stop.
+    /// Waits for the firmware to end, after a packet with `stop`.
     ///
     /// # Errors
-    /// If it does not end within the limit, or not as a firmware does.
+    /// If it does not end within the limit, or fails.
     pub fn finish(mut self) -> Result<Finished, RunError> {
         let (status, log, message) = self.attended.end(self.limit)?;
         run::finish(status, log, message, true)
     }
 }
 
-/// What has to be there before the emulator starts.
+/// Resources that must exist before the emulator starts.
 enum Waiting {
     Files { from_ecu: File, to_ecu: PathBuf },
     Uart { socket: PathBuf },
@@ -267,7 +270,7 @@ fn open_without_waiting(path: &Path, read: bool) -> std::io::Result<File> {
 }
 
 impl Waiting {
-    /// Opens the link once the emulator has opened its end.
+    /// Opens the link after the emulator has opened its end.
     fn open(self, attended: &mut Attended, limit: Duration) -> Result<Transport, RunError> {
         match self {
             Self::Files { from_ecu, to_ecu } => Ok(Transport {
@@ -291,7 +294,7 @@ impl Waiting {
     }
 }
 
-/// Tries until the emulator has opened its end.
+/// Repeats until the emulator has opened its end.
 fn retry<T>(
     attended: &mut Attended,
     limit: Duration,
@@ -337,7 +340,7 @@ impl Transport {
     }
 }
 
-/// Fills `bytes`, waiting at most `limit` for each piece: a faulty ECU may stop in the middle of a packet.
+/// Fills `bytes`, waiting at most `limit` for each part, because a faulty ECU may stop in the middle of a packet.
 fn read_exact(file: &mut File, limit: Duration, mut bytes: &mut [u8]) -> std::io::Result<()> {
     while !bytes.is_empty() {
         let length = read_some(file, limit, bytes)?;
@@ -358,7 +361,7 @@ fn write_all(file: &mut File, limit: Duration, mut bytes: &[u8]) -> std::io::Res
     while !bytes.is_empty() {
         match file.write(bytes) {
             Ok(length) => bytes = &bytes[length..],
-            // An emulator that takes nothing has left its pipe full.
+            // The pipe is full if the emulator reads nothing.
             Err(error) if error.kind() == ErrorKind::WouldBlock => {
                 wait_until_ready(file, PollFlags::OUT, limit)?;
             }
@@ -368,9 +371,9 @@ fn write_all(file: &mut File, limit: Duration, mut bytes: &[u8]) -> std::io::Res
     Ok(())
 }
 
-/// Waits at most `limit`, and no longer than until the user wants to stop.
+/// Waits at most `limit`, or until the user interrupts.
 fn wait_until_ready(file: &File, flags: PollFlags, limit: Duration) -> std::io::Result<()> {
-    // The clock is looked at only where the answer does not come soon.
+    // The clock is read only if the answer is not immediate.
     if is_ready(file, flags, limit.min(LOOK))? {
         return Ok(());
     }
@@ -397,9 +400,9 @@ fn receive_packet(
     bytes: &mut [u8; TO_HOST_LEN],
 ) -> std::io::Result<()> {
     let mut buffer = [0; 64];
-    // Far more than a packet has, with what a line may hold before the first.
+    // Much more than a packet, plus the bytes that may precede the first.
     for _ in 0..64 {
-        // The ECU sends nothing after its packet until it is answered, so nothing is read past it.
+        // The ECU sends nothing after its packet until it is answered, so no byte of a later packet is read.
         let length = read_some(file, limit, &mut buffer)?;
         for &byte in &buffer[..length] {
             match deframer.push(byte) {

@@ -1,10 +1,10 @@
-//! A scenario as the firmware's command line takes it.
+//! A scenario as the firmware's command line.
 
 use shared_model::Scenario;
 use toml::{Table, Value};
 
-/// One `section.name=value` a parameter, complete, so that the firmware's own presets do not matter. The numbers are those
-/// of f32, in the shortest decimals that read back to the same bits.
+/// One `section.name=value` per parameter, complete, so that the firmware's presets have no effect. The numbers are f32 values in
+/// the shortest decimal form that reads back to the same bits.
 ///
 /// ```
 /// let settings = qemu::settings::of(&shared_model::Scenario::<f32>::reconstruction());

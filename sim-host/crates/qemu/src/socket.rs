@@ -1,4 +1,4 @@
-//! A local socket on which the emulator answers, with a time-out on everything.
+//! A local socket of the emulator, with a time-out on every operation.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
@@ -7,27 +7,27 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 const POLL: Duration = Duration::from_millis(2);
-/// Longest answer that is a line, bytes.
+/// Maximum length of a one-line answer, bytes.
 pub(crate) const LONGEST_LINE: u64 = 1 << 20;
 
-/// Why the emulator did not do what it was asked for.
+/// An error of a request to the emulator.
 #[derive(Debug, thiserror::Error)]
 pub enum SocketError {
-    /// Nothing came in time.
+    /// No answer in time.
     #[error("no answer within {} s", .0.as_secs_f64())]
     TimedOut(Duration),
     /// The connection failed, or the emulator ended.
     #[error("the connection failed: {0}")]
     Lost(std::io::Error),
-    /// An answer that is not of the protocol.
-    #[error("an answer that is not understood: {0:?}")]
+    /// An answer outside the protocol.
+    #[error("unexpected answer {0:?}")]
     NotUnderstood(String),
-    /// The emulator refuses the request.
-    #[error("{request:?} was refused: {answer}")]
+    /// The emulator rejected the request.
+    #[error("{request:?} was rejected: {answer}")]
     Refused {
-        /// What was asked for.
+        /// The request.
         request: String,
-        /// What it said.
+        /// The answer.
         answer: String,
     },
 }
@@ -40,7 +40,7 @@ pub(crate) struct Socket {
 }
 
 impl Socket {
-    /// Connects as soon as the emulator listens. `limit` is the longest wait for that, and for an answer later.
+    /// Connects as soon as the emulator listens. `limit` is the time limit of the connection and of each answer.
     pub(crate) fn connect(path: &Path, limit: Duration) -> Result<Self, SocketError> {
         let start = Instant::now();
         let stream = loop {

@@ -1,4 +1,4 @@
-//! The firmware's telemetry, read back.
+//! The firmware's telemetry.
 
 use files::input;
 use shared_model::telemetry::{
@@ -8,12 +8,12 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-/// A whole run as the firmware recorded it.
+/// A complete run, recorded by the firmware.
 #[derive(Debug, Clone)]
 pub struct Recording {
-    /// What the records mean.
+    /// Rates and units of the records.
     pub header: Header,
-    /// One a model step.
+    /// One record per model step.
     pub records: Vec<Record>,
     /// All duty codes in order.
     pub duties: Vec<u16>,
@@ -21,7 +21,7 @@ pub struct Recording {
     pub trailer: Trailer,
 }
 
-/// Why telemetry cannot be used.
+/// An error of reading telemetry.
 #[derive(Debug, thiserror::Error)]
 pub enum TelemetryError {
     /// The file cannot be read.
@@ -35,14 +35,14 @@ pub enum TelemetryError {
     /// A frame is damaged.
     #[error("telemetry is damaged at byte {offset} ({frame}): {error}")]
     Damaged {
-        /// Where the frame starts.
+        /// First byte of the frame.
         offset: usize,
-        /// Which frame.
+        /// The frame.
         frame: String,
-        /// What is wrong with it.
+        /// The error.
         error: FrameError,
     },
-    /// A duty code that its timer cannot hold.
+    /// A duty code that exceeds the period of its timer.
     #[error(
         "telemetry is wrong at record {record}: duty code {code} of a PWM period of {period} counts"
     )]
@@ -57,7 +57,7 @@ pub enum TelemetryError {
     /// A record is missing.
     #[error("telemetry is incomplete: record {found} follows record {last}")]
     Gap {
-        /// The record before.
+        /// The preceding record.
         last: u32,
         /// The record found.
         found: u32,
@@ -70,10 +70,10 @@ pub enum TelemetryError {
         /// Records that the firmware counted.
         written: u32,
     },
-    /// There is something behind the trailer.
+    /// There are bytes after the trailer.
     #[error("telemetry continues after its trailer: bytes {bytes}")]
     Excess {
-        /// How many.
+        /// Number of bytes.
         bytes: usize,
     },
 }
@@ -82,7 +82,7 @@ impl Recording {
     /// Reads a telemetry file.
     ///
     /// # Errors
-    /// If it cannot be read, is cut short, or has a bit changed.
+    /// If it cannot be read, is truncated, or is damaged.
     pub fn open(path: &Path) -> Result<Self, TelemetryError> {
         let is_header = |start: &[u8]| Header::decode(start).is_ok();
         let bytes = input::read(path, input::RECORDING_BYTES, is_header).map_err(|source| {
@@ -94,7 +94,7 @@ impl Recording {
         Self::decode(&bytes)
     }
 
-    /// The trailer at the end of a telemetry file, of which no more is read.
+    /// Reads only the trailer at the end of a telemetry file.
     ///
     /// # Errors
     /// If the file cannot be read, or does not end with a trailer.
@@ -118,7 +118,7 @@ impl Recording {
     /// Reads a telemetry stream.
     ///
     /// # Errors
-    /// If it is cut short or has a bit changed.
+    /// If it is truncated or damaged.
     pub fn decode(bytes: &[u8]) -> Result<Self, TelemetryError> {
         let header = Header::decode(bytes).map_err(|error| damaged(0, "header", error))?;
         let length = record_len(header.samples_per_step);
@@ -157,7 +157,7 @@ impl Recording {
         if let (Some(gap), 0) = (gap, trailer.overruns) {
             return Err(gap);
         }
-        // A firmware that ended in a fault could not write its last records.
+        // After a fault, the firmware could not write its last records.
         if trailer.exit_code == 0 && trailer.records as usize != records.len() {
             return Err(TelemetryError::Count {
                 found: records.len(),

@@ -69,7 +69,7 @@ fn unnamed(folder: &Path) -> io::Result<File> {
     Ok(file.into())
 }
 
-/// A file with a name of its own in the folder.
+/// A file with a unique name in the folder.
 fn named(folder: &Path) -> io::Result<(File, TempPath)> {
     let file = builder()
         .permissions(Permissions::from_mode(NEW_FILE))
@@ -77,7 +77,7 @@ fn named(folder: &Path) -> io::Result<(File, TempPath)> {
     Ok(file.map_err(without_name)?.into_parts())
 }
 
-/// Gives an unnamed file a name of its own in the folder.
+/// Gives an unnamed file a unique name in the folder.
 fn link(file: &File, folder: &Path) -> io::Result<TempPath> {
     let descriptor = format!("/proc/self/fd/{}", file.as_fd().as_raw_fd());
     let link = |name: &Path| {
@@ -94,7 +94,7 @@ fn builder() -> Builder<'static, 'static> {
     builder
 }
 
-/// The error without the hidden file's name, which nobody has asked for.
+/// The error without the hidden file's name, which the user has not given.
 fn without_name(error: io::Error) -> io::Error {
     error.kind().into()
 }

@@ -1,4 +1,4 @@
-//! Where the bytes of a path go.
+//! Destination of the bytes of a path.
 
 use rustix::fs::{Access, OFlags, access, major, minor};
 use std::ffi::{OsStr, OsString};
@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 /// The name of standard output.
 pub const STDOUT: &str = "-";
 
-/// Links that are followed before they count as a loop, as in the kernel.
+/// Maximum number of links followed, as in the kernel.
 const MOST_LINKS: usize = 40;
 
-/// Linux's numbers of the device that discards everything, to which any number of outputs may go.
+/// Device numbers of `/dev/null` in Linux, which any number of outputs may share.
 const NULL_DEVICE: (u32, u32) = (1, 3);
 
-/// Why nothing can be written to a path.
+/// The reason why a path cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "each message is its description")]
 pub enum Unwritable {
@@ -35,13 +35,13 @@ pub enum Unwritable {
     DanglingLink(PathBuf),
     #[error("a folder cannot be standard output; give ./- for a folder of this name")]
     FolderOnStdout,
-    #[error("there is no folder {}; make it first", .0.display())]
+    #[error("the folder {} does not exist; create it first", .0.display())]
     NoFolder(PathBuf),
-    #[error("{} is no folder", .0.display())]
+    #[error("{} is not a folder", .0.display())]
     NotAFolder(PathBuf),
     #[error("the name is empty")]
     EmptyName,
-    #[error("it names a folder; give the name of a file")]
+    #[error("it is the name of a folder; give the name of a file")]
     NamesAFolder,
     #[error("descriptor {} is not open", .0.display())]
     ClosedDescriptor(OsString),
@@ -53,7 +53,7 @@ pub enum Unwritable {
     Io(#[from] io::Error),
 }
 
-/// Where the bytes of an output go.
+/// Destination of the bytes of an output.
 #[derive(Debug)]
 pub enum Place {
     /// To standard output.
@@ -66,15 +66,15 @@ pub enum Place {
     File {
         /// Its path without links.
         path: PathBuf,
-        /// What is known of an earlier one.
+        /// Metadata of an existing file.
         earlier: Option<Metadata>,
         /// There is one, or a link to where it would be.
         exists: bool,
     },
 }
 
-/// What two names of the same file have in common: device and number of the file, or of a folder that is there and the rest of
-/// the name.
+/// Identity of a file, equal for all of its names: device and inode of the file, or of an existing parent folder together with the
+/// rest of the name.
 #[derive(Debug, PartialEq)]
 pub struct Identity {
     node: (u64, u64),
@@ -82,7 +82,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// Of something that is there.
+    /// Identity of an existing file.
     pub fn of(metadata: &Metadata) -> Self {
         Self {
             node: (metadata.dev(), metadata.ino()),
@@ -90,7 +90,7 @@ impl Identity {
         }
     }
 
-    /// Of standard output, if it is open.
+    /// Identity of standard output, if it is open.
     pub fn of_stdout() -> Option<Self> {
         let metadata = stdout().and_then(|file| file.metadata());
         metadata.ok().map(|metadata| Self::of(&metadata))
@@ -98,7 +98,7 @@ impl Identity {
 }
 
 impl Place {
-    /// Follows the path, and checks that it leads to something that can be written.
+    /// Follows the path, and checks that its target can be written.
     pub fn of(path: &Path) -> Result<Self, Unwritable> {
         if path == Path::new(STDOUT) {
             check_descriptor(Path::new("/proc/self/fd"), OsStr::new("1"))?;
@@ -157,7 +157,7 @@ impl Place {
         })
     }
 
-    /// An open descriptor, which is written into even if it is a regular file's: who opened it has decided so.
+    /// An open descriptor, which is written into even if it is that of a regular file, as its opener requested.
     fn of_descriptor(folder: &Path, name: &OsStr) -> Result<Self, Unwritable> {
         check_descriptor(folder, name)?;
         let path = folder.join(name);
@@ -172,7 +172,7 @@ impl Place {
         Self::of_node(path, metadata)
     }
 
-    /// What it has in common with other names of the same.
+    /// Its identity, equal for all names of the same file.
     pub fn identity(&self) -> Result<Identity, Unwritable> {
         let metadata = match self {
             Self::Stdout => stdout()?.metadata()?,
@@ -200,9 +200,9 @@ pub fn stdout() -> io::Result<File> {
     Ok(own.into())
 }
 
-/// Opens what is no regular file, or a descriptor, to write into it.
+/// Opens a descriptor, or a destination that is not a regular file, for writing.
 pub fn open_stream(path: &Path) -> io::Result<File> {
-    // A terminal must not become the process's own, and what a descriptor's file holds stays.
+    // A terminal must not become the controlling terminal, and the content of a descriptor's file is kept.
     let flags = OFlags::NOCTTY | OFlags::APPEND;
     OpenOptions::new()
         .append(true)
@@ -210,7 +210,7 @@ pub fn open_stream(path: &Path) -> io::Result<File> {
         .open(path)
 }
 
-/// Checks that files can be written into a folder, which may be missing; what it has in common with other names of the same.
+/// Checks that files can be written into a folder, which may be missing. Returns its identity.
 pub fn folder(path: &Path) -> Result<Identity, Unwritable> {
     if path == Path::new(STDOUT) {
         return Err(Unwritable::FolderOnStdout);
@@ -295,7 +295,7 @@ fn is_of_descriptors(folder: &Path) -> bool {
     folder.starts_with("/proc") && folder.ends_with("fd")
 }
 
-/// Refuses a descriptor that is not open for writing.
+/// Rejects a descriptor that is not open for writing.
 fn check_descriptor(folder: &Path, name: &OsStr) -> Result<(), Unwritable> {
     let path = folder.join(name);
     if fs::metadata(&path).is_err() {

@@ -77,7 +77,7 @@ const CASES: [Case; 19] = [
     refused(
         "link",
         |at| symlink("none/d", at.join("link")).unwrap(),
-        "there is no folder",
+        "does not exist; create it first",
     ),
     refused(
         "link",
@@ -102,13 +102,13 @@ const CASES: [Case; 19] = [
         |at| drop(UnixListener::bind(at.join("d")).unwrap()),
         "it is a socket",
     ),
-    refused("d/", |_| (), "it names a folder"),
-    refused("d/.", |_| (), "it names a folder"),
-    refused("..", |_| (), "it names a folder"),
+    refused("d/", |_| (), "it is the name of a folder"),
+    refused("d/.", |_| (), "it is the name of a folder"),
+    refused("..", |_| (), "it is the name of a folder"),
     refused("", |_| (), "the name is empty"),
-    refused("none/d", |_| (), "there is no folder"),
-    refused("d/x", file, "is no folder"),
-    refused("d/x/y", file, "is no folder"),
+    refused("none/d", |_| (), "does not exist; create it first"),
+    refused("d/x", file, "is not a folder"),
+    refused("d/x/y", file, "is not a folder"),
 ];
 
 /// What is seen of a file.
@@ -374,7 +374,7 @@ fn a_folder_is_one_that_can_be_made() {
         check(name).unwrap();
     }
     for (name, part) in [
-        ("d", "is no folder"),
+        ("d", "is not a folder"),
         ("d/x", "Not a directory"),
         ("link", "link to nothing"),
         ("link/x", "link to nothing"),
