@@ -46,7 +46,7 @@ impl Function {
     }
 
     /// Upper bound of its stack size, bytes; `None` if there is none.
-    pub fn frame_bytes(&self) -> Option<u32> {
+    pub(crate) fn frame_bytes(&self) -> Option<u32> {
         match self.stated_bytes {
             Some(stated) => Some(stated.max(self.counted_bytes)),
             None => (!self.sets_stack_pointer).then_some(self.counted_bytes),

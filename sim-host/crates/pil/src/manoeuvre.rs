@@ -109,7 +109,7 @@ impl Manoeuvre {
     }
 
     /// Motor current that the driver requests at `time_s`, A.
-    pub fn current_request_at(&self, time_s: f64) -> f64 {
+    pub(crate) fn current_request_at(&self, time_s: f64) -> f64 {
         let sine = self.current_request_sine;
         self.current_request_a.at(time_s) + sine.map_or(0.0, |sine| sine.at(time_s))
     }

@@ -156,7 +156,7 @@ impl Plant {
     }
 
     /// Slip angle of the front tyres, rad.
-    pub fn front_slip_angle_rad(&self) -> f64 {
+    pub(crate) fn front_slip_angle_rad(&self) -> f64 {
         self.model.slip_angles(&self.state.x).0
     }
 

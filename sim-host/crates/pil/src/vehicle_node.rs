@@ -127,7 +127,7 @@ impl VehicleNode {
     }
 
     /// Whether the lead-in is over.
-    pub fn has_begun(&self) -> bool {
+    pub(crate) fn has_begun(&self) -> bool {
         self.periods > self.lead_in_periods
     }
 
@@ -137,7 +137,7 @@ impl VehicleNode {
     }
 
     /// Status of the last check of an actuator frame; one is due at every control tick.
-    pub fn frame_status(&self) -> Status {
+    pub(crate) fn frame_status(&self) -> Status {
         self.frame_status
     }
 

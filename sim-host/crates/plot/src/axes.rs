@@ -137,7 +137,7 @@ impl<'a> Axes<'a> {
     }
 
     /// Dots, those in the same pixel once: as small as the line is wide, or twice as large where they are few.
-    pub fn dots(&self, points: &[Point], line: Line) {
+    pub(crate) fn dots(&self, points: &[Point], line: Line) {
         let runs = pixel_runs(points.iter().map(|point| self.place(*point)));
         if runs.is_empty() {
             return;

@@ -6,7 +6,7 @@ use std::cell::RefCell;
 use std::fmt::Write;
 
 /// Units of a drawing in a CSS pixel.
-pub const UNITS_PER_PIXEL: i32 = 2;
+pub(crate) const UNITS_PER_PIXEL: i32 = 2;
 
 /// A point of an area: units from its left and its upper end.
 pub type Place = (i32, i32);
@@ -211,7 +211,7 @@ impl Area<'_> {
     }
 
     /// Vertical strokes with round ends, each a column with its first and last row: a dot where they coincide.
-    pub fn strokes(&self, strokes: &[(i32, i32, i32)], line: Line) {
+    pub(crate) fn strokes(&self, strokes: &[(i32, i32, i32)], line: Line) {
         let mut path = String::new();
         for &(x, from, to) in strokes {
             let (x, from, to) = (self.x(x), self.y(from), self.y(to));
@@ -263,7 +263,7 @@ impl Area<'_> {
     }
 
     /// A text from below upwards.
-    pub fn upward_text(&self, text: &str, place: Place, style: TextStyle) {
+    pub(crate) fn upward_text(&self, text: &str, place: Place, style: TextStyle) {
         let (x, y) = (self.x(place.0), self.y(place.1));
         self.turned_text(
             text,

@@ -13,7 +13,7 @@ pub struct Raster {
 
 impl Raster {
     /// The raster as a PNG file.
-    pub fn png(&self) -> Vec<u8> {
+    pub(crate) fn png(&self) -> Vec<u8> {
         let rows = self.colours.len() / self.width;
         let mut png = Vec::new();
         let mut encoder = png::Encoder::new(&mut png, self.width as u32, rows as u32);

@@ -10,7 +10,7 @@ pub const TICK_FONT: u32 = 24;
 /// Height of other text.
 pub const TEXT_FONT: u32 = 25;
 /// Height of a heading.
-pub const HEADING_FONT: u32 = 30;
+pub(crate) const HEADING_FONT: u32 = 30;
 /// Greatest mean width of a character over the font's height in a bold text.
 pub(crate) const CHARACTER_WIDTH: f64 = 0.6;
 
@@ -52,9 +52,9 @@ pub const RUNS: [Line; 6] = [
 ];
 
 /// A level to compare with.
-pub const LEVEL: Line = line(Colour(0x77, 0x77, 0x7a), 2, "");
+pub(crate) const LEVEL: Line = line(Colour(0x77, 0x77, 0x7a), 2, "");
 /// Series of dots that share a panel.
-pub const DOTS: [Line; 4] = [
+pub(crate) const DOTS: [Line; 4] = [
     line(Colour(0x10, 0x2b, 0x5d), 3, ""),
     line(Colour(0xc9, 0x6f, 0x04), 3, ""),
     line(Colour(0x2f, 0x8c, 0x58), 3, ""),

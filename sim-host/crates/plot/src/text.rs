@@ -44,7 +44,7 @@ fn with_unit(text: &str, check: &Check) -> String {
 }
 
 /// Name of a status for people.
-pub fn status_word(status: Status) -> &'static str {
+pub(crate) fn status_word(status: Status) -> &'static str {
     match status {
         Status::Passed => "passed",
         Status::Failed => "failed",

@@ -51,7 +51,7 @@ impl Qmp {
     ///
     /// # Errors
     /// If the emulator does not answer.
-    pub fn monitor(&mut self, line: &str) -> Result<String, SocketError> {
+    pub(crate) fn monitor(&mut self, line: &str) -> Result<String, SocketError> {
         let printed = self.execute("human-monitor-command", json!({"command-line": line}))?;
         let text = printed.as_str().map(str::to_owned);
         text.ok_or_else(|| SocketError::NotUnderstood(printed.to_string()))

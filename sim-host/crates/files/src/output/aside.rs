@@ -38,7 +38,7 @@ impl Aside {
     }
 
     /// The file is complete: it takes its name, and with `force` another's place.
-    pub fn take_name(self, file: &File, force: bool) -> io::Result<()> {
+    pub(crate) fn take_name(self, file: &File, force: bool) -> io::Result<()> {
         if let Some(earlier) = &self.earlier {
             // Only root can give a file away; otherwise the owner changes, as with any editor that renames.
             let _ = fchown(file, Some(earlier.uid()), Some(earlier.gid()));

@@ -9,7 +9,7 @@ use std::os::unix::fs::{FileTypeExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 /// The name of standard output.
-pub const STDOUT: &str = "-";
+pub(crate) const STDOUT: &str = "-";
 
 /// Maximum number of links followed, as in the kernel.
 const MOST_LINKS: usize = 40;
@@ -91,7 +91,7 @@ impl Identity {
     }
 
     /// Identity of standard output, if it is open.
-    pub fn of_stdout() -> Option<Self> {
+    pub(crate) fn of_stdout() -> Option<Self> {
         let metadata = stdout().and_then(|file| file.metadata());
         metadata.ok().map(|metadata| Self::of(&metadata))
     }
@@ -201,7 +201,7 @@ pub fn stdout() -> io::Result<File> {
 }
 
 /// Opens a descriptor, or a destination that is not a regular file, for writing.
-pub fn open_stream(path: &Path) -> io::Result<File> {
+pub(crate) fn open_stream(path: &Path) -> io::Result<File> {
     // A terminal must not become the controlling terminal, and the content of a descriptor's file is kept.
     let flags = OFlags::NOCTTY | OFlags::APPEND;
     OpenOptions::new()

@@ -48,7 +48,7 @@ pub enum Action {
 
 impl Action {
     /// All manipulations except bit flips, once each.
-    pub const EVENTS: [Self; 10] = [
+    pub(crate) const EVENTS: [Self; 10] = [
         Self::MissPwm(1),
         Self::MissPwm(3),
         Self::DoublePwm,

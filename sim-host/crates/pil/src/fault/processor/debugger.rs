@@ -32,7 +32,7 @@ pub struct Debugger<'a> {
 
 impl Debugger<'_> {
     /// Performs an action at a control tick, from 1.
-    pub fn act(&self, action: Action, tick: u32) -> Result<(), SocketError> {
+    pub(crate) fn act(&self, action: Action, tick: u32) -> Result<(), SocketError> {
         let mut gdb = Gdb::connect(self.gdb, self.time_out)?;
         let mut qmp = Qmp::connect(self.qmp, self.time_out)?;
         self.run_to_tick(&mut gdb, tick)?;
