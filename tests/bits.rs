@@ -1,4 +1,5 @@
-//! Level 1 of the equivalence: the firmware's f32 run equals the host's, word for word, in every form of the model.
+//! Level 1 of the equivalence: the firmware's f32 run equals the host's, word for word, in every
+//! form of the model.
 
 use dynamics::simulate::simulate;
 use dynamics::trace::Trace;

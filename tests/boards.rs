@@ -1,4 +1,5 @@
-//! The same ECU on other boards: an STM32F405 whose timer is inspected from outside, and the images of all boards.
+//! The same ECU on other boards: an STM32F405 whose timer is inspected from outside, and the images
+//! of all boards.
 
 use dynamics::simulate::simulate;
 use pil::equivalence::bits;
@@ -55,9 +56,11 @@ fn the_same_program_gives_the_same_bits() {
     }
 }
 
-/// Stops the core at every PWM interrupt, where the timer still holds the duty of the interrupt before.
+/// Stops the core at every PWM interrupt, where the timer still holds the duty of the interrupt
+/// before.
 ///
-/// A stop takes away the time till the next interrupt (see `pil::gdb`), so the model's one step is due after the last.
+/// A stop takes away the time till the next interrupt (see `pil::gdb`), so the model's one step is
+/// due after the last.
 #[test]
 fn every_duty_is_in_the_timers_register() {
     for waveform in [Waveform::Square, Waveform::Sine] {
@@ -100,7 +103,8 @@ fn every_duty_is_in_the_timers_register() {
     }
 }
 
-/// Data written to the RAM through the core is visible past it, and conversely; there is nothing where nothing is mapped.
+/// Data written to the RAM through the core is visible past it, and conversely; there is nothing
+/// where nothing is mapped.
 #[test]
 fn memory_is_read_and_written() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
@@ -192,7 +196,8 @@ fn without_a_word_about_it_the_timer_is_the_boards() {
     assert_eq!(open(folder.path()).header.pwm_period, 1600);
 }
 
-/// The trailer's duty is read back from the timer. No watchdog here: the emulator has none for this chip.
+/// The trailer's duty is read back from the timer. No watchdog here: the emulator has none for this
+/// chip.
 #[test]
 fn faults_put_the_timer_to_neutral() {
     for (fault, exit_code) in [("panic", 13), ("hard-fault", 14), ("stack-overflow", 14)] {
@@ -305,7 +310,8 @@ fn memory_map(board: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Origin and length of a region, bytes, from a line as `RAM   : ORIGIN = 0x20000000, LENGTH = 128K`.
+/// Origin and length of a region, bytes, from a line as `RAM   : ORIGIN = 0x20000000, LENGTH =
+/// 128K`.
 fn region(map: &str, name: &str) -> (u64, u64) {
     let line = map.lines().find_map(|line| {
         let (origin, length) = line.trim().strip_prefix(name)?.split_once(", LENGTH = ")?;

@@ -1,4 +1,5 @@
-//! Cost of Rust on the target: the model's step and the ECU program's tasks beside the C reference, whose bits are equal.
+//! Cost of Rust on the target: the model's step and the ECU program's tasks beside the C reference,
+//! whose bits are equal.
 
 use qemu::Machine;
 use std::collections::BTreeMap;
@@ -24,7 +25,8 @@ const MEASURED: [(&str, &str); 3] = [
         "dither.waveform=sine dither.amplitude_v=1.0 dither.start_time_s=0.2",
     ),
 ];
-/// The model's alternatives, most of which spend their time in the same library: only bits are compared.
+/// The model's alternatives, most of which spend their time in the same library: only bits are
+/// compared.
 const ALTERNATIVES: [&str; 3] = [
     "preset=printed dither.waveform=sine dither.amplitude_v=1.0",
     "friction.dithered=true dither.waveform=square dither.amplitude_v=0.1",

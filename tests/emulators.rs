@@ -1,5 +1,5 @@
-//! Programs that are called as the emulator and are none, or fail as one may: the host neither believes nor waits for
-//! them, and leaves nothing of them behind.
+//! Programs that are called as the emulator and are none, or fail as one may: the host neither
+//! believes nor waits for them, and leaves nothing of them behind.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;

@@ -1,4 +1,5 @@
-//! Instructions of the host's integrator, counted by callgrind, so that a slower engine shows without a clock.
+//! Instructions of the host's integrator, counted by callgrind, so that a slower engine shows
+//! without a clock.
 
 use engine::taylor::{Ensemble, Observables, Span};
 use shared_model::Scenario;

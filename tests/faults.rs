@@ -1,5 +1,5 @@
-//! Faults of the firmware: the PWM goes neutral first, then a distinct exit code; the runner never hangs and leaves no
-//! emulator behind.
+//! Faults of the firmware: the PWM goes neutral first, then a distinct exit code; the runner never
+//! hangs and leaves no emulator behind.
 
 use qemu::telemetry::Recording;
 use qemu::{Machine, RunError};

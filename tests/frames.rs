@@ -1,5 +1,6 @@
-//! Frames against implementations that share no code with this project: the Python packages autosar-e2e (in C) and
-//! cantools, the latter with the DBC file; and for the statuses, which the Python package does not give, a Rust crate.
+//! Frames against implementations that share no code with this project: the Python packages
+//! autosar-e2e (in C) and cantools, the latter with the DBC file; and for the statuses, which the
+//! Python package does not give, a Rust crate.
 
 use autosar_e2e::profile5::{Profile5, Profile5Config};
 use autosar_e2e::{E2EProfile, E2EStatus};
@@ -144,7 +145,8 @@ impl Value {
         match self {
             Self::Text(text) => text == other,
             Self::Number(number) => {
-                // The other side prints f64; none of its digits may be lost on the way to f32 and back.
+                // The other side prints f64; none of its digits may be lost on the way to f32 and
+                // back.
                 let read: f64 = other.parse().expect("a number");
                 let same = read.to_bits() == f64::from(*number).to_bits();
                 same || (read.is_nan() && number.is_nan())
@@ -237,7 +239,8 @@ fn bytes_checks_and_signals_are_those_of_python() {
     }
 }
 
-/// Every flipped bit, random damage, and frames of the other kind: both sides find them, and the same ones.
+/// Every flipped bit, random damage, and frames of the other kind: both sides find them, and the
+/// same ones.
 #[test]
 fn damaged_and_foreign_frames_are_bad_for_both() {
     let mut rng = Rng::with_seed(5);
@@ -311,7 +314,8 @@ fn statuses_are_those_of_another_crate() {
     .expect("the configuration is valid");
 
     let mut seen = Vec::new();
-    // The first frame as it is: that crate starts with another counter than the profile has, 0 for 255.
+    // The first frame as it is: that crate starts with another counter than the profile has, 0 for
+    // 255.
     let mut number = 0;
     let mut received = frames[0];
     while number + 7 < frames.len() {

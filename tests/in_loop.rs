@@ -1,5 +1,6 @@
-//! The firmware in the loop: the same commands as the program on the host, over every link and on every board that the
-//! emulator has, twice the same bytes, and a clear end where the firmware is dead.
+//! The firmware in the loop: the same commands as the program on the host, over every link and on
+//! every board that the emulator has, twice the same bytes, and a clear end where the firmware is
+//! dead.
 
 use pil::closed_loop::run;
 use pil::comparison::{Depth, compare};
@@ -211,7 +212,8 @@ fn a_firmware_that_dies_or_refuses_is_said() {
         "{silent:?}"
     );
 
-    // The host that stops answering is noticed when the pipes close; the emulator ends with the session.
+    // The host that stops answering is noticed when the pipes close; the emulator ends with the
+    // session.
     let settings = qemu::settings::of(&ecu);
     let mut session = start(&[], &settings).expect("it starts");
     session.receive().expect("the first period");

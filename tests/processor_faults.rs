@@ -1,5 +1,5 @@
-//! Faults of the ECU's processor, injected into the firmware through the emulator's gdb stub; and faults between vehicle and
-//! ECU, to which firmware and host react bit-identically.
+//! Faults of the ECU's processor, injected into the firmware through the emulator's gdb stub; and
+//! faults between vehicle and ECU, to which firmware and host react bit-identically.
 
 use pil::fault::catalogue::{self, Kind};
 use pil::fault::judge::{Detector, Reaction, Verdict};

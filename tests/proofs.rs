@@ -1,4 +1,5 @@
-//! Proofs about the firmware's images: worst stack, size, instructions of the tasks, jitter of the interrupts.
+//! Proofs about the firmware's images: worst stack, size, instructions of the tasks, jitter of the
+//! interrupts.
 
 use image::Image;
 use image::memory::Map;
@@ -19,7 +20,8 @@ use tests::golden::{Figure, check_figures};
 use tests::{TIME_OUT, board_image, framed_image, image, record, root, scenario};
 
 const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
-/// Memory that the ECU's program may use on any board, bytes: limits of this project, far below what the boards have.
+/// Memory that the ECU's program may use on any board, bytes: limits of this project, far below
+/// what the boards have.
 const STACK_LIMIT_BYTES: u32 = 16 * 1024;
 const FLASH_LIMIT_BYTES: u32 = 128 * 1024;
 const RAM_LIMIT_BYTES: u32 = 64 * 1024;
@@ -102,7 +104,8 @@ fn the_analysed_image_is_the_one_that_runs() {
     }
 }
 
-/// Nothing that was ever measured is deeper than the bound, and the bound is not from another world.
+/// Nothing that was ever measured is deeper than the bound, and the bound is not from another
+/// world.
 #[test]
 fn no_run_is_deeper_than_the_bound() {
     let bound = proven_stack("mps2", &framed_image("mps2")).worst_bytes;

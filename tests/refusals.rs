@@ -1,4 +1,5 @@
-//! The firmware checks its scenario on the target and refuses a bad one with a named error and an exit code.
+//! The firmware checks its scenario on the target and refuses a bad one with a named error and an
+//! exit code.
 
 use qemu::Machine;
 use shared_model::Scenario;
@@ -77,7 +78,8 @@ fn bad_scenarios_are_refused_by_name() {
     }
 }
 
-/// The host's message for the same settings, which it parses by the same code in the same arithmetic.
+/// The host's message for the same settings, which it parses by the same code in the same
+/// arithmetic.
 fn host(settings: &[String]) -> Option<String> {
     let mut scenario = Scenario::<f32>::reconstruction();
     for setting in settings {
@@ -96,8 +98,8 @@ fn words(sentence: &str) -> Vec<String> {
     sentence.split_whitespace().map(word).collect()
 }
 
-/// The settings that the host refuses are those that the firmware refuses, in the same words with the same values and
-/// bounds.
+/// The settings that the host refuses are those that the firmware refuses, in the same words with
+/// the same values and bounds.
 #[test]
 fn host_and_firmware_refuse_the_same_in_the_same_words() {
     let mut cases: Vec<Vec<String>> = Vec::new();

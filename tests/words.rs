@@ -1,7 +1,8 @@
-//! Plain words in texts, comments and messages: phrases that are not used, and what to write instead.
+//! Plain words in texts, comments and messages: phrases that are not used, and what to write
+//! instead.
 //!
-//! A phrase is listed only if it is never right. Texts are searched for all of them, Rust sources outside the folders that
-//! the rule still exempts.
+//! A phrase is listed only if it is never right. Texts are searched for all of them, Rust sources
+//! outside the folders that the rule still exempts.
 
 use std::fs;
 use std::path::Path;
@@ -220,7 +221,8 @@ fn prose_of_rust(source: &str) -> String {
                 prose.push(CODE);
                 i += 1;
                 while i < chars.len() && at(i) != '"' {
-                    // At a line's end a backslash joins two lines; an escaped character is none of prose.
+                    // At a line's end a backslash joins two lines; an escaped character is none of
+                    // prose.
                     if at(i) == '\\' {
                         i += 1;
                         prose.push(if at(i) == '\n' { '\n' } else { ' ' });

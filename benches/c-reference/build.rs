@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use std::process::Command;
 
 const C_COMPILER: &str = "arm-none-eabi-gcc";
-/// Single precision in hardware, and no multiplication contracted with an addition: bits as in Rust.
+/// Single precision in hardware, and no multiplication contracted with an addition: bits as in
+/// Rust.
 const C_FLAGS: [&str; 10] = [
     "-std=c11",
     "-O3",

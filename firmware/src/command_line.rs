@@ -42,11 +42,13 @@ pub fn read() -> Result<Command, CommandError> {
     parse(text().ok_or(CommandError::Unreadable)?)
 }
 
-/// The command line; `None` if the host has none or a longer one than the buffer, or at the second call.
+/// The command line; `None` if the host has none or a longer one than the buffer, or at the second
+/// call.
 pub fn text() -> Option<&'static str> {
     let buffer = cortex_m::singleton!(: [u8; MAX_BYTES] = [0; MAX_BYTES])?;
     let mut block = [buffer.as_mut_ptr() as usize, MAX_BYTES];
-    // SAFETY: the operation writes at most MAX_BYTES bytes of the buffer and both words of the block.
+    // SAFETY: the operation writes at most MAX_BYTES bytes of the buffer and both words of the
+    // block.
     let failed = unsafe { syscall1(GET_COMMAND_LINE, block.as_mut_ptr() as usize) };
     let text = core::str::from_utf8(buffer.get(..block[1])?).ok()?;
     (failed == 0).then_some(text.trim_end_matches('\0'))

@@ -16,8 +16,8 @@ pub fn end_safely(code: ExitCode) -> ! {
 }
 
 /// Uses the whole stack from its top: after an overflow there is none left.
-// SAFETY: sets the stack pointer to the top of the stack and continues; the former stack is not needed any more, as nothing
-// returns from here.
+// SAFETY: sets the stack pointer to the top of the stack and continues; the former stack is not
+// needed any more, as nothing returns from here.
 #[unsafe(naked)]
 #[unsafe(export_name = "HardFault")]
 #[unsafe(link_section = ".HardFault.ecu")]
@@ -30,15 +30,16 @@ unsafe extern "C" fn hard_fault() -> ! {
     )
 }
 
-// SAFETY: the one function of that name. It has one for the sake of the stack's bound, which begins here, after the
-// assembly.
+// SAFETY: the one function of that name. It has one for the sake of the stack's bound, which begins
+// here, after the assembly.
 #[unsafe(no_mangle)]
 extern "C" fn end_hard_fault() -> ! {
     end_safely(ExitCode::HardFault)
 }
 
 /// The watchdog's interrupt.
-// SAFETY: touches only atomics, device registers and the host, so it may interrupt anything; and it does not return.
+// SAFETY: touches only atomics, device registers and the host, so it may interrupt anything; and it
+// does not return.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
     end_safely(ExitCode::Watchdog)

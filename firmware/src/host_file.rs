@@ -80,7 +80,8 @@ impl HostFile {
         }
     }
 
-    /// Reads as many bytes as `bytes` has, in one operation, waiting for them where the file is a pipe.
+    /// Reads as many bytes as `bytes` has, in one operation, waiting for them where the file is a
+    /// pipe.
     ///
     /// # Errors
     /// If the host gave fewer.

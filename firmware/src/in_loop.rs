@@ -1,5 +1,5 @@
-//! The ECU in the loop: sensor frames come over the link, duty codes and actuator frames go out on it, and the host moves
-//! the vehicle in between.
+//! The ECU in the loop: sensor frames come over the link, duty codes and actuator frames go out on
+//! it, and the host moves the vehicle in between.
 
 use crate::board::{Board, Current};
 use crate::exit::ExitCode;
@@ -45,7 +45,8 @@ impl PwmInterrupt {
     /// One PWM period.
     pub fn run(&mut self) {
         let period = self.task.begin();
-        // The PWM's period is the duty's, so the code fits; one that is refused is found on the pin.
+        // The PWM's period is the duty's, so the code fits; one that is refused is found on the
+        // pin.
         let _ = self.pwm.set_duty_cycle(period.duty.code());
         let output = critical_section::with(|cs| {
             period

@@ -1,8 +1,9 @@
 //! The two tasks as interrupts, whichever program runs in them.
 //!
-//! SysTick is the PWM interrupt, at high priority. Once per control period it pends the PendSV exception, at low priority,
-//! which runs the control task. So the two rates are locked, and the PWM interrupt preempts a control task that is still
-//! at work. Nothing here can panic: the binary `panic-free` proves it at link time.
+//! SysTick is the PWM interrupt, at high priority. Once per control period it pends the PendSV
+//! exception, at low priority, which runs the control task. So the two rates are locked, and the
+//! PWM interrupt preempts a control task that is still at work. Nothing here can panic: the binary
+//! `panic-free` proves it at link time.
 
 use crate::board::{Board, Current};
 use crate::{clock, counters, in_loop, jitter, open_loop, tasks};
@@ -13,7 +14,8 @@ use cortex_m_rt::exception;
 use critical_section::Mutex;
 use shared_model::Scenario;
 
-/// The watchdog bites when no model step arrives for this many of its periods, or for this long, ms, if that is longer.
+/// The watchdog bites when no model step arrives for this many of its periods, or for this long,
+/// ms, if that is longer.
 const WATCHDOG_PERIODS: f32 = 4.0;
 const WATCHDOG_LEAST_MS: u32 = 20;
 /// Priorities as the registers have them; a lower number preempts a higher one.
@@ -23,8 +25,8 @@ const CONTROL_PRIORITY: u8 = 0xE0;
 static PWM_START: Mutex<Cell<Option<PwmInterrupt>>> = Mutex::new(Cell::new(None));
 static CONTROL_START: Mutex<Cell<Option<ControlInterrupt>>> = Mutex::new(Cell::new(None));
 
-/// The task of the PWM interrupt. By reference: an interrupt that moves a whole task needs the stack for it,
-/// and delays the other for most of a fast PWM's period.
+/// The task of the PWM interrupt. By reference: an interrupt that moves a whole task needs the
+/// stack for it, and delays the other for most of a fast PWM's period.
 pub enum PwmInterrupt {
     /// The vehicle model runs on the ECU.
     OpenLoop(&'static mut open_loop::PwmInterrupt),
@@ -40,7 +42,8 @@ pub enum ControlInterrupt {
     InLoop(&'static mut in_loop::ControlInterrupt),
 }
 
-/// Starts PWM, interrupts and watchdog; `tasks` makes the tasks of the two interrupts. The control task runs every `tick_s`.
+/// Starts PWM, interrupts and watchdog; `tasks` makes the tasks of the two interrupts. The control
+/// task runs every `tick_s`.
 pub fn start(
     period: u16,
     scenario: &Scenario<f32>,
@@ -70,7 +73,8 @@ pub fn hand_over(pwm: PwmInterrupt, control: ControlInterrupt, samples_per_ms: u
 }
 
 fn set_priorities() {
-    // SAFETY: called once, inside a critical section, so nothing runs at the old priorities meanwhile.
+    // SAFETY: called once, inside a critical section, so nothing runs at the old priorities
+    // meanwhile.
     unsafe {
         let mut core = cortex_m::Peripherals::steal();
         SCB::set_priority(&mut core.SCB, SystemHandler::SysTick, PWM_PRIORITY);

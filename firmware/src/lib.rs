@@ -1,5 +1,5 @@
-//! Steering ECU: the program of `shared-model` on a Cortex-M, with interrupts, telemetry and a safe state around it. No
-//! arithmetic of the model is here.
+//! Steering ECU: the program of `shared-model` on a Cortex-M, with interrupts, telemetry and a safe
+//! state around it. No arithmetic of the model is here.
 //!
 //! | subject | module |
 //! |---|---|

@@ -10,7 +10,8 @@ const TO_HOST: &str = "to-host";
 const TO_ECU: &str = "to-ecu";
 /// Polls of an empty UART after which the host counts as gone: some seconds of an emulator.
 const PATIENCE_POLLS: u32 = 10_000_000;
-/// Clocks between two polls: without them an emulator spends its time on the polls and not on the bytes.
+/// Clocks between two polls: without them an emulator spends its time on the polls and not on the
+/// bytes.
 const POLL_CLOCKS: u32 = 1000;
 
 /// A link, open.
@@ -30,8 +31,8 @@ enum Transport {
 /// The source of the PWM periods' timing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pace {
-    /// The host: a period begins when the last one is answered, and each takes its nominal time. The emulator then has no
-    /// time to pass.
+    /// The host: a period begins when the last one is answered, and each takes its nominal time.
+    /// The emulator then has no time to pass.
     Host,
     /// The board's timer, by whose clock the gate measures the control ticks.
     Timer,
@@ -42,8 +43,8 @@ pub enum Pace {
 pub struct LinkLost;
 
 impl Link {
-    /// Opens the link of that name: `files` (the emulator's files, at the host's pace), `timed` (the same at the
-    /// timer's), or `uart` (at the host's).
+    /// Opens the link of that name: `files` (the emulator's files, at the host's pace), `timed`
+    /// (the same at the timer's), or `uart` (at the host's).
     ///
     /// # Errors
     /// If there is none of that name, or the host has not opened its end.

@@ -1,7 +1,8 @@
 //! The log: defmt frames to the host's console, one write per frame.
 //!
-//! The stock semihosting logger writes each frame in many small operations, each a trap into the emulator. This one
-//! gathers a frame first. Fault handlers do not log: they may have interrupted a frame.
+//! The stock semihosting logger writes each frame in many small operations, each a trap into the
+//! emulator. This one gathers a frame first. Fault handlers do not log: they may have interrupted a
+//! frame.
 
 use crate::host_file::HostFile;
 use core::cell::UnsafeCell;
@@ -48,7 +49,8 @@ struct Frame {
 
 struct Shared(UnsafeCell<Frame>);
 
-// SAFETY: the cell is touched only between acquire and release, which hold a critical section on a single core.
+// SAFETY: the cell is touched only between acquire and release, which hold a critical section on a
+// single core.
 unsafe impl Sync for Shared {}
 
 static FRAME: Shared = Shared(UnsafeCell::new(Frame {

@@ -1,4 +1,5 @@
-//! The ECU in open loop: it runs the vehicle model itself, and its telemetry is compared with the host's.
+//! The ECU in open loop: it runs the vehicle model itself, and its telemetry is compared with the
+//! host's.
 
 use crate::board::{Board, Current};
 use crate::counters::{self, count_overrun};
@@ -38,7 +39,8 @@ impl PwmInterrupt {
     /// One PWM period.
     pub fn run(&mut self) {
         let sample = self.task.run();
-        // The PWM's period is the duty's, so the code fits; a PWM that refuses it keeps the last one.
+        // The PWM's period is the duty's, so the code fits; a PWM that refuses it keeps the last
+        // one.
         if self.pwm.set_duty_cycle(sample.duty.code()).is_err() {
             count_overrun();
         }

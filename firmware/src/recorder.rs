@@ -53,7 +53,8 @@ impl RecordProducer {
     }
 }
 
-/// The main loop's end: takes records and duty codes from the rings and writes them to the host in chunks.
+/// The main loop's end: takes records and duty codes from the rings and writes them to the host in
+/// chunks.
 pub struct Recorder {
     records: Consumer<'static, Record, RECORD_RING>,
     duties: Consumer<'static, u16, DUTY_RING>,
@@ -64,7 +65,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// The rings, and the stream if there is a `path`, with its header written. `None` at the second call.
+    /// The rings, and the stream if there is a `path`, with its header written. `None` at the
+    /// second call.
     ///
     /// # Errors
     /// If the host cannot write the file.
@@ -141,8 +143,8 @@ impl Recorder {
     }
 }
 
-/// Writes the trailer, if a stream is open. Works from any handler: it needs no recorder; bytes that the recorder has
-/// gathered and not written are lost.
+/// Writes the trailer, if a stream is open. Works from any handler: it needs no recorder; bytes
+/// that the recorder has gathered and not written are lost.
 ///
 /// # Errors
 /// If the host cannot write the file.

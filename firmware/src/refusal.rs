@@ -19,7 +19,8 @@ pub fn refuse_command(error: &CommandError) -> ExitCode {
 
 /// For a scenario that cannot be run.
 pub fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
-    // In the words of its `Display`, whose formatting would take flash and panics; a test holds the two together.
+    // In the words of its `Display`, whose formatting would take flash and panics; a test holds the
+    // two together.
     match *error {
         InvalidScenario::OutOfRange(error) => defmt::error!(
             "scenario refused: {=str}.{=str} = {=f64}: must be a finite number from {=f64} to {=f64}",

@@ -1,7 +1,8 @@
 //! The stack: an overflow is detected, and its deepest use is measured.
 //!
-//! It lies at the start of the RAM, and the memory protection unit lets nothing into the addresses below, which on some
-//! machines take writes without a fault. Its free part is painted at the start and inspected at the end.
+//! It lies at the start of the RAM, and the memory protection unit lets nothing into the addresses
+//! below, which on some machines take writes without a fault. Its free part is painted at the start
+//! and inspected at the end.
 
 use core::ptr::{read_volatile, write_volatile};
 
@@ -11,8 +12,9 @@ const MARGIN: usize = 256;
 
 /// Size of the region below the stack, bytes, a power of two: more than any function's frame.
 const GUARD_BYTES: u32 = 32 * 1024;
-/// Bits of the protection unit's registers (ARMv7-M Architecture Reference Manual, B3.5): region on, execution never, no
-/// access; unit on, its regions on top of the usual map, and off in the fault handlers themselves.
+/// Bits of the protection unit's registers (ARMv7-M Architecture Reference Manual, B3.5): region
+/// on, execution never, no access; unit on, its regions on top of the usual map, and off in the
+/// fault handlers themselves.
 const REGION_ON: u32 = 1;
 const EXECUTE_NEVER: u32 = 1 << 28;
 const UNIT_ON: u32 = 1;
@@ -37,9 +39,11 @@ pub fn guard() {
     let (bottom, _) = bounds();
     // The size's field holds the power of two less one.
     let size = (GUARD_BYTES.trailing_zeros() - 1) << 1;
-    // SAFETY: called before anything else could use the unit; no address of the region belongs to the program.
+    // SAFETY: called before anything else could use the unit; no address of the region belongs to
+    // the program.
     unsafe {
-        // Not by the crate's own way to the peripherals, which then are taken, and the board could not have them.
+        // Not by the crate's own way to the peripherals, which then are taken, and the board could
+        // not have them.
         let unit = &*cortex_m::peripheral::MPU::PTR;
         unit.rnr.write(0);
         unit.rbar.write(bottom as u32 - GUARD_BYTES);

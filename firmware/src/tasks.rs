@@ -1,4 +1,5 @@
-//! The state that the interrupts and the main program share: the control task is due, the run is finished.
+//! The state that the interrupts and the main program share: the control task is due, the run is
+//! finished.
 
 use crate::board::{Board, Current};
 use core::sync::atomic::{AtomicBool, Ordering};

@@ -133,7 +133,8 @@ fn read_elf(bytes: &[u8]) {
         image.address_of("Reset");
         let _ = Stack::analyse(&image.bytes, &PRIORITIES);
         let _ = image::function_names(&image.bytes);
-        // An image that is run is a program that is trusted, so its log's formats are: they are only read here.
+        // An image that is run is a program that is trusted, so its log's formats are: they are
+        // only read here.
         let _ = LogDecoder::new(&image);
     }
 }

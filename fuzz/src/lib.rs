@@ -1,10 +1,10 @@
 //! Hostile bytes for every reader of external data.
 //!
-//! A [`Target`] is a reader with the repair of checksums and frames that lets inputs reach its inner code. The test
-//! `replay` runs the corpus and a fixed number of mutations of each through [`Target::check`], the same ones every time;
-//! the driver `guided` leads libFuzzer there, which looks for inputs that reach new code (`cargo xtask fuzz`). Both
-//! require the same of a reader: no panic, and memory within a multiple of its input. A run that ends shows that every
-//! reader does.
+//! A [`Target`] is a reader with the repair of checksums and frames that lets inputs reach its
+//! inner code. The test `replay` runs the corpus and a fixed number of mutations of each through
+//! [`Target::check`], the same ones every time; the driver `guided` leads libFuzzer there, which
+//! looks for inputs that reach new code (`cargo xtask fuzz`). Both require the same of a reader: no
+//! panic, and memory within a multiple of its input. A run that ends shows that every reader does.
 
 mod images;
 mod links;

@@ -38,7 +38,8 @@ const WORDS: [&str; 16] = [
     "\u{10FFFF}",
 ];
 
-/// Changes the input in one to four ways, puts in a part of `other`, and most times makes check sums right again.
+/// Changes the input in one to four ways, puts in a part of `other`, and most times makes check
+/// sums right again.
 pub fn mutate(target: &Target, rng: &mut Rng, input: &mut Vec<u8>, other: &[u8]) {
     for _ in 0..rng.u32(1..=4) {
         once(rng, input, other);

@@ -16,7 +16,8 @@ pub struct Target {
     pub mutations: u32,
 }
 
-/// Memory that a reader may take however short its input is, bytes: a scenario as text and tables, and buffers.
+/// Memory that a reader may take however short its input is, bytes: a scenario as text and tables,
+/// and buffers.
 pub const FLOOR: u64 = 512 * 1024;
 
 /// No repair.

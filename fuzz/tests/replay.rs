@@ -1,4 +1,5 @@
-//! The corpus, and mutations of it that are the same every time: no panic, no more memory than a multiple of the input.
+//! The corpus, and mutations of it that are the same every time: no panic, no more memory than a
+//! multiple of the input.
 
 use fastrand::Rng;
 use fuzz::mutate::mutate;
@@ -100,7 +101,8 @@ fn repaired_inputs_are_read() {
         let target = Target::find(name).unwrap();
         let seed = &(target.seeds)()[0];
         assert!(is_read(seed), "{name}");
-        // A digit of the last row, or a bit of the last record, with the check sum left as it was and made right.
+        // A digit of the last row, or a bit of the last record, with the check sum left as it was
+        // and made right.
         let mut changed = seed.clone();
         let at = changed.len() - 40;
         let digit = changed[at..]

@@ -1,4 +1,5 @@
-//! The command gate around a controller of one's own: a sound command passes, one beyond the slew limit latches the safe state.
+//! The command gate around a controller of one's own: a sound command passes, one beyond the slew
+//! limit latches the safe state.
 //!
 //! `cargo run --release -p shared-model --example own_controller`
 

@@ -1,5 +1,5 @@
-//! The controller: the driver's request becomes the motor's share of the servo voltage, the wheel speed the dither's
-//! amplitude. The gate that guards it shares no code with it.
+//! The controller: the driver's request becomes the motor's share of the servo voltage, the wheel
+//! speed the dither's amplitude. The gate that guards it shares no code with it.
 
 use crate::Real;
 use crate::ecu_schedule::Table;

@@ -1,15 +1,17 @@
-//! Dither: a fast signal added ahead of a nonlinearity, which then acts on the slow motion through its mean.
+//! Dither: a fast signal added ahead of a nonlinearity, which then acts on the slow motion through
+//! its mean.
 //!
-//! Two ways to apply it. *Averaged*: the model uses the effective nonlinearity, (21) for a square wave and (23) for a
-//! sine. *Signal*: the model is stepped at the PWM rate and each step sees the sample of the true signal that the PWM
-//! holds.
+//! Two ways to apply it. *Averaged*: the model uses the effective nonlinearity, (21) for a square
+//! wave and (23) for a sine. *Signal*: the model is stepped at the PWM rate and each step sees the
+//! sample of the true signal that the PWM holds.
 
 use crate::Real;
 use crate::listed;
 use crate::parameter::parameters;
 
-/// Greatest error of the oscillator's sine on the ECU (micromath in f32), measured over all phases by a test of this
-/// module. It is 1.1 mV at an amplitude of 1 V, a ninth of one PWM step of the presets.
+/// Greatest error of the oscillator's sine on the ECU (micromath in f32), measured over all phases
+/// by a test of this module. It is 1.1 mV at an amplitude of 1 V, a ninth of one PWM step of the
+/// presets.
 pub const OSCILLATOR_SINE_ERROR: f64 = 1.2e-3;
 
 listed! {
@@ -105,8 +107,8 @@ impl<T: Real> Dither<T> {
         self.amplitude_v * rad_per_volt
     }
 
-    /// Effect on the nonlinearities once the dither is on: the mean over its period, or `sample` (in units of the
-    /// amplitude) held over one step.
+    /// Effect on the nonlinearities once the dither is on: the mean over its period, or `sample`
+    /// (in units of the amplitude) held over one step.
     pub fn injection(&self, sample: T) -> Injection<T> {
         let amplitude = self.amplitude_rad();
         match (self.waveform, self.application) {
@@ -165,14 +167,15 @@ impl<T: Real> Injection<T> {
     }
 }
 
-/// Number of Gauss-Chebyshev nodes. They hold the mean of the Magic Formula of set A to 1e-6 of its peak up to an
-/// amplitude of 0.2 rad (the paper's largest is 0.19 rad), and to 2e-5 up to 0.3 rad.
+/// Number of Gauss-Chebyshev nodes. They hold the mean of the Magic Formula of set A to 1e-6 of its
+/// peak up to an amplitude of 0.2 rad (the paper's largest is 0.19 rad), and to 2e-5 up to 0.3 rad.
 const NODES: usize = 32;
 
 /// Mean of a function over a sine, equation (23), by Gauss-Chebyshev quadrature.
 ///
-/// Substituting u = sin(theta) turns (23) into the integral of f(y + W u)/(pi sqrt(1 - u^2)) over [-1, 1], whose Gauss
-/// nodes are cos((2 k - 1) pi/(2 n)) with equal weights: exact for polynomials of degree 2 n - 1.
+/// Substituting u = sin(theta) turns (23) into the integral of f(y + W u)/(pi sqrt(1 - u^2)) over
+/// [-1, 1], whose Gauss nodes are cos((2 k - 1) pi/(2 n)) with equal weights: exact for polynomials
+/// of degree 2 n - 1.
 #[derive(Debug, Clone, Copy)]
 pub struct SineMean<T> {
     nodes: [T; NODES],
@@ -226,8 +229,8 @@ impl<T: Real> Default for SineMean<T> {
 
 /// Phase accumulator and waveform: one sample per PWM period.
 ///
-/// The phase counts 2^-32 turns in an integer, so it neither drifts nor differs between machines. The frequency is met
-/// to half a count, 2^-33 of the sample rate.
+/// The phase counts 2^-32 turns in an integer, so it neither drifts nor differs between machines.
+/// The frequency is met to half a count, 2^-33 of the sample rate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Oscillator {
     waveform: Waveform,

@@ -1,10 +1,12 @@
-//! End-to-end protection of frames: AUTOSAR E2E profile 5, from the sender's memory to the receiver's.
+//! End-to-end protection of frames: AUTOSAR E2E profile 5, from the sender's memory to the
+//! receiver's.
 //!
-//! A frame begins with a CRC-16 (2 bytes, little-endian) and a counter (1 byte). The checksum also covers a data ID that
-//! is not sent, so that a frame taken for another one is detected like a flipped bit; the counter distinguishes loss,
-//! repetition and wrong order.
+//! A frame begins with a CRC-16 (2 bytes, little-endian) and a counter (1 byte). The checksum also
+//! covers a data ID that is not sent, so that a frame taken for another one is detected like a
+//! flipped bit; the counter distinguishes loss, repetition and wrong order.
 //!
-//! Source: AUTOSAR FO, "E2E Protocol Specification" (PRS_E2EProtocol), profile 5, with the header at offset 0.
+//! Source: AUTOSAR FO, "E2E Protocol Specification" (PRS_E2EProtocol), profile 5, with the header
+//! at offset 0.
 
 use crate::exchange::FrameBytes;
 
@@ -27,7 +29,8 @@ pub struct Sender {
 }
 
 impl Sender {
-    /// A sender of the frames with that data ID, which must be unique among the frames that could be confused.
+    /// A sender of the frames with that data ID, which must be unique among the frames that could
+    /// be confused.
     pub const fn new(data_id: u16) -> Self {
         Self {
             data_id,
@@ -59,7 +62,8 @@ pub enum Status {
     Error,
     /// Whole, with the counter of the last whole frame.
     Repeated,
-    /// Whole, with a counter too far ahead or back: too many lost, wrong order, or the sender started again.
+    /// Whole, with a counter too far ahead or back: too many lost, wrong order, or the sender
+    /// started again.
     WrongSequence,
 }
 
@@ -79,8 +83,9 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// A receiver of the frames with that data ID. `max_delta_counter`, from 1 to 254, is the greatest step of the
-    /// counter that is tolerated: one frame fewer than that may be missing.
+    /// A receiver of the frames with that data ID. `max_delta_counter`, from 1 to 254, is the
+    /// greatest step of the counter that is tolerated: one frame fewer than that may be
+    /// missing.
     pub const fn new(data_id: u16, max_delta_counter: u8) -> Self {
         Self {
             data_id,

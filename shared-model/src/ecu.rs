@@ -1,13 +1,15 @@
 //! The ECU's program in the loop: sensor frames in, duty codes and actuator frames out.
 //!
-//! The PWM task runs at the PWM rate, in an interrupt, and signals when a control tick is due. The control task checks the
-//! sensor frame, runs the controller, and passes both to the gate. Its result acts from the next control tick on, however
-//! long it took, so that the timing of interrupts cannot change a result.
+//! The PWM task runs at the PWM rate, in an interrupt, and signals when a control tick is due. The
+//! control task checks the sensor frame, runs the controller, and passes both to the gate. Its
+//! result acts from the next control tick on, however long it took, so that the timing of
+//! interrupts cannot change a result.
 //!
-//! Both tasks run twice, on two sets of parameters and state in memory (`dual_channel`). A mismatch indicates memory
-//! corruption and latches the safe state; until that acts, the duty closer to neutral is put out. The actuator frame is
-//! the first channel's, with the lower of both wheel speed limits. [`Ecu`] runs the tasks in turn on the host; firmware
-//! runs them at two priorities. Both give the same bits.
+//! Both tasks run twice, on two sets of parameters and state in memory (`dual_channel`). A mismatch
+//! indicates memory corruption and latches the safe state; until that acts, the duty closer to
+//! neutral is put out. The actuator frame is the first channel's, with the lower of both wheel
+//! speed limits. [`Ecu`] runs the tasks in turn on the host; firmware runs them at two priorities.
+//! Both give the same bits.
 
 mod consistency;
 mod control;
@@ -48,9 +50,9 @@ impl<T: Real> Ecu<T> {
         })
     }
 
-    /// One PWM period: `exchange` takes the ECU's output at its start and returns the input at its end.
-    /// `elapsed_counts` is the time since the last control tick by the independent clock, read where one is due. Returns the
-    /// result of the control task, if it ran.
+    /// One PWM period: `exchange` takes the ECU's output at its start and returns the input at its
+    /// end. `elapsed_counts` is the time since the last control tick by the independent clock,
+    /// read where one is due. Returns the result of the control task, if it ran.
     pub fn period(
         &mut self,
         exchange: impl FnOnce(&Packet) -> Packet,

@@ -1,8 +1,10 @@
-//! The signals on the ECU's pins in one PWM period, as fixed-length packets: a host takes the place of servo and sensors.
+//! The signals on the ECU's pins in one PWM period, as fixed-length packets: a host takes the place
+//! of servo and sensors.
 //!
-//! At the start of each period the ECU puts out its duty, and at a control tick an actuator frame. The host moves the
-//! vehicle through that period and answers with the duty that was seen on the servo's pin and, at a control tick, a
-//! sensor frame. The frames themselves are opaque here; the module `frame` reads them.
+//! At the start of each period the ECU puts out its duty, and at a control tick an actuator frame.
+//! The host moves the vehicle through that period and answers with the duty that was seen on the
+//! servo's pin and, at a control tick, a sensor frame. The frames themselves are opaque here; the
+//! module `frame` reads them.
 
 /// Length of a sensor or actuator frame, bytes: a CAN FD payload.
 pub const FRAME_LEN: usize = 24;
@@ -21,10 +23,11 @@ pub const TO_ECU_LEN: usize = PACKET_LEN + 1;
 /// One direction of the exchange in one PWM period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Packet {
-    /// From the ECU: the duty code of the period that begins. To the ECU: the code that was captured at the servo's pin
-    /// during that period.
+    /// From the ECU: the duty code of the period that begins. To the ECU: the code that was
+    /// captured at the servo's pin during that period.
     pub duty_code: u16,
-    /// From the ECU an actuator frame, to the ECU a sensor frame; `None` between control ticks, or if it was lost.
+    /// From the ECU an actuator frame, to the ECU a sensor frame; `None` between control ticks, or
+    /// if it was lost.
     pub frame: Option<FrameBytes>,
 }
 
@@ -62,7 +65,8 @@ impl Packet {
 pub struct ToHost {
     /// Duty and actuator frame.
     pub packet: Packet,
-    /// Most counts of the cost clock that the PWM task took in a period since the last control tick, without the exchange.
+    /// Most counts of the cost clock that the PWM task took in a period since the last control
+    /// tick, without the exchange.
     pub pwm_cost: u16,
     /// Counts of the cost clock that the last control task took.
     pub control_cost: u16,

@@ -1,5 +1,5 @@
-//! Sensor and actuator frames: CAN FD payloads of 24 bytes, little-endian, protected end to end. `docs/dithersteer.dbc`
-//! describes them to other tools.
+//! Sensor and actuator frames: CAN FD payloads of 24 bytes, little-endian, protected end to end.
+//! `docs/dithersteer.dbc` describes them to other tools.
 //!
 //! | bytes | sensor frame | actuator frame |
 //! |---|---|---|
@@ -11,7 +11,8 @@
 //! | 16..20 | steering rate | wheel speed limit |
 //! | 20..24 | current request | warnings (2 bytes), counter of the last valid sensor frame, 0 |
 //!
-//! Numbers pass as their bits: to judge a NaN or an impossible value is the gate's task, not the link's.
+//! Numbers pass as their bits: to judge a NaN or an impossible value is the gate's task, not the
+//! link's.
 
 use crate::e2e::Sender;
 use crate::exchange::FrameBytes;
@@ -24,9 +25,10 @@ pub const SENSOR_DATA_ID: u16 = 0x5A01;
 pub const ACTUATOR_DATA_ID: u16 = 0x5A02;
 /// Greatest tolerated step of the counter, for both frames.
 ///
-/// Two lost frames in a row are bridged: in the 3 ms to the next one, at 1 kHz, even the chaotic motion at 1750 rpm moves no
-/// signal by more than 2 % of its range. A whole frame out of place, its counter being arbitrary, passes with a chance of
-/// 3 in 256, so this is not larger than needed.
+/// Two lost frames in a row are bridged: in the 3 ms to the next one, at 1 kHz, even the chaotic
+/// motion at 1750 rpm moves no signal by more than 2 % of its range. A whole frame out of place,
+/// its counter being arbitrary, passes with a chance of 3 in 256, so this is not larger than
+/// needed.
 pub const MAX_DELTA_COUNTER: u8 = 3;
 
 /// A frame as words of four bytes, on whose borders its numbers lie.
@@ -119,7 +121,8 @@ pub fn decode_actuation(frame: &FrameBytes) -> Result<Actuation<f32>, UnknownMod
     })
 }
 
-// Both directions are patterns, not indices: what cannot miss needs no proof that it does not panic.
+// Both directions are patterns, not indices: what cannot miss needs no proof that it does not
+// panic.
 
 #[rustfmt::skip]
 fn protected(words: Words, sender: &mut Sender) -> FrameBytes {

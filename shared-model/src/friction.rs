@@ -1,5 +1,5 @@
-//! Dry friction of the steering: Coulomb friction on the steering rate with true stick, and the law as printed in the
-//! paper.
+//! Dry friction of the steering: Coulomb friction on the steering rate with true stick, and the law
+//! as printed in the paper.
 
 use crate::Real;
 use crate::dither::Injection;
@@ -62,7 +62,8 @@ impl<T: Real> Friction<T> {
         }
     }
 
-    /// The dither as the sign function's argument meets it: in rad for the printed law, in rad/s for Coulomb's.
+    /// The dither as the sign function's argument meets it: in rad for the printed law, in rad/s
+    /// for Coulomb's.
     pub fn injection(&self, injection: Injection<T>, frequency_rad_per_s: T) -> Injection<T> {
         match (self.dithered, self.law) {
             (false, _) | (_, FrictionLaw::None) => Injection::Off,
@@ -96,13 +97,15 @@ impl FrictionMode {
     }
 }
 
-/// The sign function under dither: either piecewise constant with steps at `lower` and `upper`, or smooth.
+/// The sign function under dither: either piecewise constant with steps at `lower` and `upper`, or
+/// smooth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sign<T> {
     /// No friction: zero everywhere.
     Zero,
-    /// -1 below `lower`, 0 between, 1 above `upper`. Without dither both are 0; a held sample of the signal moves both by
-    /// its negative; the mean over a square wave of amplitude A has them at -A and A, equation (21).
+    /// -1 below `lower`, 0 between, 1 above `upper`. Without dither both are 0; a held sample of
+    /// the signal moves both by its negative; the mean over a square wave of amplitude A has
+    /// them at -A and A, equation (21).
     Stepped {
         /// Upper end of -1.
         lower: T,
@@ -176,7 +179,8 @@ impl<T: Real> Sign<T> {
         }
     }
 
-    /// The first step that the argument passes on its way to `argument` when it comes from `mode`, and the mode after it.
+    /// The first step that the argument passes on its way to `argument` when it comes from `mode`,
+    /// and the mode after it.
     pub fn crossing(&self, mode: FrictionMode, argument: T) -> Option<(T, FrictionMode)> {
         use FrictionMode::{Negative, Neutral, Positive};
         let Self::Stepped { lower, upper } = *self else {

@@ -1,10 +1,11 @@
 //! Fixed-step fourth-order Runge-Kutta method for the model with dry friction, as the ECU uses it.
 //!
-//! The friction mode is held over a step, so that each step integrates a smooth right-hand side. A step in which the mode
-//! has to change is split once, where it does: where the friction law's argument passes one of its steps, or where the
-//! torque on a sticking steering reaches its limit. A mode held over the rest of such a step would make the map jump, err in
-//! first order, and have another Lyapunov exponent than the flow. The split costs at most three Runge-Kutta steps instead of
-//! one, so the worst case stays bounded.
+//! The friction mode is held over a step, so that each step integrates a smooth right-hand side. A
+//! step in which the mode has to change is split once, where it does: where the friction law's
+//! argument passes one of its steps, or where the torque on a sticking steering reaches its limit.
+//! A mode held over the rest of such a step would make the map jump, err in first order, and have
+//! another Lyapunov exponent than the flow. The split costs at most three Runge-Kutta steps instead
+//! of one, so the worst case stays bounded.
 
 use crate::Real;
 use crate::dither::Injection;
@@ -14,13 +15,13 @@ use nalgebra::Vector4;
 
 /// Advances `state` by one step of `step_s` seconds, the dither's `injection` being held.
 ///
-/// Fourth order where the motion is smooth. The instant of a change of mode is found by linear interpolation over the
-/// step, which leaves a second-order error. Only the first change of mode in a step is detected; a second one takes
-/// effect in the next step.
+/// Fourth order where the motion is smooth. The instant of a change of mode is found by linear
+/// interpolation over the step, which leaves a second-order error. Only the first change of mode in
+/// a step is detected; a second one takes effect in the next step.
 ///
-/// Coulomb friction under the mean of a square wave so weak that the steering rate reaches W times the dither's frequency
-/// (below 2e-4 rad for the paper's) would slide along the two steps of its sign function; here it chatters between modes, in
-/// first order.
+/// Coulomb friction under the mean of a square wave so weak that the steering rate reaches W times
+/// the dither's frequency (below 2e-4 rad for the paper's) would slide along the two steps of its
+/// sign function; here it chatters between modes, in first order.
 ///
 /// ```
 /// use shared_model::{Scenario, dither::Injection, integrate, vehicle::Model};
@@ -138,7 +139,8 @@ fn runge_kutta_4<T: Real>(
     let k4 = model.derivative(&(x + k3 * step_s), injection, mode);
     let mut next = x + (k1 + k2 * two + k3 * two + k4) * sixth;
     if mode == FrictionMode::Sticking {
-        // Exactly zero, so that what an arithmetic carries beside the value (tangents) vanishes in the stick.
+        // Exactly zero, so that what an arithmetic carries beside the value (tangents) vanishes in
+        // the stick.
         next[STEERING_RATE] = T::zero();
     }
     next

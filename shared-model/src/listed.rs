@@ -1,7 +1,7 @@
 //! Enumerations with the list of their variants and a name for each, both from one declaration.
 
-/// Declares an enumeration without fields, with the constant `ALL`, which lists its variants in their order, and, where
-/// every variant is followed by `=> "name"`, the method `name`.
+/// Declares an enumeration without fields, with the constant `ALL`, which lists its variants in
+/// their order, and, where every variant is followed by `=> "name"`, the method `name`.
 ///
 /// ```
 /// shared_model::listed! {

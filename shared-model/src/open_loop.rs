@@ -1,9 +1,11 @@
-//! The ECU in open loop: a PWM task that dithers the servo's voltage, and a control task that steps the vehicle model on the
-//! ECU itself, without sensors. The program that firmware and host are compared on.
+//! The ECU in open loop: a PWM task that dithers the servo's voltage, and a control task that steps
+//! the vehicle model on the ECU itself, without sensors. The program that firmware and host are
+//! compared on.
 //!
-//! The PWM task runs at the PWM rate, in an interrupt. It signals when the control task is due, once in a fixed number of
-//! samples, so that the two rates are locked to each other. Firmware runs the two at different priorities; [`OpenLoop`]
-//! runs them in turn on the host. Both give the same bits.
+//! The PWM task runs at the PWM rate, in an interrupt. It signals when the control task is due,
+//! once in a fixed number of samples, so that the two rates are locked to each other. Firmware runs
+//! the two at different priorities; [`OpenLoop`] runs them in turn on the host. Both give the same
+//! bits.
 
 use crate::dither::{Dither, Injection, Oscillator};
 use crate::servo::{Duty, Pwm};
@@ -72,7 +74,8 @@ pub struct ControlTask<T> {
 }
 
 impl<T: Real> ControlTask<T> {
-    /// One model step. `dither` is the sample that the PWM holds during the step; the averaged model does not use it.
+    /// One model step. `dither` is the sample that the PWM holds during the step; the averaged
+    /// model does not use it.
     pub fn run(&mut self, dither: T) -> &State<T> {
         let injection = if self.steps_to_dither == 0 {
             self.dither.injection(dither)
@@ -84,7 +87,8 @@ impl<T: Real> ControlTask<T> {
         &self.state
     }
 
-    /// Continues from another state: for comparing single steps, and for carrying tangents along a recorded trajectory.
+    /// Continues from another state: for comparing single steps, and for carrying tangents along a
+    /// recorded trajectory.
     pub fn set_state(&mut self, state: State<T>) {
         self.state = state;
     }
@@ -143,8 +147,8 @@ impl<T: Real> OpenLoop<T> {
         Ok(Self { pwm, control })
     }
 
-    /// PWM periods up to and including the next model step; `on_duty` receives each duty; returns the state after the
-    /// step.
+    /// PWM periods up to and including the next model step; `on_duty` receives each duty; returns
+    /// the state after the step.
     pub fn step(&mut self, mut on_duty: impl FnMut(Duty)) -> &State<T> {
         loop {
             let sample = self.pwm.run();

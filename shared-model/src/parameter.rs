@@ -1,10 +1,12 @@
-//! Parameter sets: each number's documentation, name and range, declared once, and the checks that follow from them.
+//! Parameter sets: each number's documentation, name and range, declared once, and the checks that
+//! follow from them.
 
 use crate::Real;
 use crate::short::Short;
 use core::fmt;
 
-/// One number of a parameter set `P`: its name (which carries the unit), its allowed range, and its accessor.
+/// One number of a parameter set `P`: its name (which carries the unit), its allowed range, and its
+/// accessor.
 #[derive(Debug)]
 pub struct Field<P, T> {
     /// Name as in the configuration file, with the unit at its end.
@@ -44,13 +46,15 @@ pub trait ParameterSet<T: Real>: Copy + 'static {
         Ok(())
     }
 
-    /// Least and greatest allowed value of the number called `name`; `None` if the set has none of that name.
+    /// Least and greatest allowed value of the number called `name`; `None` if the set has none of
+    /// that name.
     fn range(name: &str) -> Option<(f64, f64)> {
         let field = Self::FIELDS.iter().find(|field| field.name == name)?;
         Some((field.min, field.max))
     }
 
-    /// Sets the number called `name`; `false` if the set has none of that name. The value is not checked.
+    /// Sets the number called `name`; `false` if the set has none of that name. The value is not
+    /// checked.
     fn set(&mut self, name: &str, value: T) -> bool {
         let field = Self::FIELDS.iter().find(|field| field.name == name);
         if let Some(field) = field {
@@ -65,8 +69,8 @@ fn check<P, T: Real>(
     field: &Field<P, T>,
     value: T,
 ) -> Result<(), OutOfRange> {
-    // Written so that NaN, which compares false with everything, is refused. The bounds are rounded to T as the value
-    // was, so that a value at its bound is allowed in every arithmetic.
+    // Written so that NaN, which compares false with everything, is refused. The bounds are rounded
+    // to T as the value was, so that a value at its bound is allowed in every arithmetic.
     if value >= T::from_f64(field.min) && value <= T::from_f64(field.max) && value.is_finite() {
         return Ok(());
     }
@@ -110,8 +114,9 @@ impl fmt::Display for OutOfRange {
 
 impl core::error::Error for OutOfRange {}
 
-/// Declares a parameter set: the structure, its names in the configuration file, the ranges, and the conversion to another
-/// arithmetic. The parameters that are no numbers come first, in a block `choices`.
+/// Declares a parameter set: the structure, its names in the configuration file, the ranges, and
+/// the conversion to another arithmetic. The parameters that are no numbers come first, in a block
+/// `choices`.
 macro_rules! parameters {
     (
         section $section:literal;

@@ -1,17 +1,20 @@
 //! The arithmetic of the model.
 //!
-//! The model is generic over [`Real`], so that one source runs in f32 on the ECU, in f64 on the host, and in any
-//! other arithmetic that implements the trait (dual numbers for tangents, numbers that carry an error bound).
+//! The model is generic over [`Real`], so that one source runs in f32 on the ECU, in f64 on the
+//! host, and in any other arithmetic that implements the trait (dual numbers for tangents, numbers
+//! that carry an error bound).
 //!
-//! The transcendental functions go through `libm` on purpose. The standard library's call the platform's C library,
-//! whose last bits differ between machines; then firmware and host would not agree bit for bit.
+//! The transcendental functions go through `libm` on purpose. The standard library's call the
+//! platform's C library, whose last bits differ between machines; then firmware and host would not
+//! agree bit for bit.
 
 use core::ops::Neg;
 use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssign, Scalar};
 
 /// A real number as the model needs it.
 ///
-/// Comparisons (`PartialOrd`) use the value alone, also in arithmetics that carry more than a value.
+/// Comparisons (`PartialOrd`) use the value alone, also in arithmetics that carry more than a
+/// value.
 pub trait Real:
     Scalar
     + Copy

@@ -93,8 +93,9 @@ impl<T: Real> Scenario<T> {
         }
     }
 
-    /// The reading of the paper that reproduces its claims, at 1750 rpm without dither: set A of Table 1 with the cubic
-    /// tyre and the printed sign, small slip angles, Coulomb friction on the steering rate with true stick, mu = 0.28.
+    /// The reading of the paper that reproduces its claims, at 1750 rpm without dither: set A of
+    /// Table 1 with the cubic tyre and the printed sign, small slip angles, Coulomb friction on
+    /// the steering rate with true stick, mu = 0.28.
     pub fn reconstruction() -> Self {
         const PER_TAU: f64 = 1.0 / core::f64::consts::TAU;
         Scenario {
@@ -159,8 +160,8 @@ impl<T: Real> Scenario<T> {
         .map(&T::from_f64)
     }
 
-    /// The paper's equations as printed: as [`reconstruction`](Self::reconstruction), but with friction by the sign of the
-    /// steering angle, dithered with it, equations (13) and (27).
+    /// The paper's equations as printed: as [`reconstruction`](Self::reconstruction), but with
+    /// friction by the sign of the steering angle, dithered with it, equations (13) and (27).
     pub fn printed() -> Self {
         let mut scenario = Self::reconstruction();
         scenario.friction.law = FrictionLaw::PrintedAngle;

@@ -4,8 +4,8 @@
 
 use crate::Real;
 
-/// Amplitudes of one waveform at equally spaced wheel speeds. Small and `Copy`: each channel of the ECU holds its own in
-/// RAM.
+/// Amplitudes of one waveform at equally spaced wheel speeds. Small and `Copy`: each channel of the
+/// ECU holds its own in RAM.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule<T, const POINTS: usize> {
     /// First wheel speed, rpm. Below it the dither is off.
@@ -51,15 +51,17 @@ impl<T: Real, const POINTS: usize> Schedule<T, POINTS> {
     }
 }
 
-/// Amplitude for a wheel speed, V, from amplitudes at equally spaced wheel speeds: the larger of its two neighbours'.
+/// Amplitude for a wheel speed, V, from amplitudes at equally spaced wheel speeds: the larger of
+/// its two neighbours'.
 ///
-/// Not interpolated: between a speed that needs no dither and one that does, a fraction of the least amplitude would not
-/// suppress the chaos, and weak dither can turn period one into chaos. In steps, only amplitudes are used that suppress
-/// it at the speeds on both sides.
+/// Not interpolated: between a speed that needs no dither and one that does, a fraction of the
+/// least amplitude would not suppress the chaos, and weak dither can turn period one into chaos. In
+/// steps, only amplitudes are used that suppress it at the speeds on both sides.
 ///
-/// Below the first speed 0: the motion is at rest or of period one. Above the last the last amplitude, as switching the
-/// dither off where the chaos is worst would be more harmful; the greatest speed of the vehicle is not decided here.
-/// A speed that is NaN or infinite gives 0. Amplitudes are returned unchecked.
+/// Below the first speed 0: the motion is at rest or of period one. Above the last the last
+/// amplitude, as switching the dither off where the chaos is worst would be more harmful; the
+/// greatest speed of the vehicle is not decided here. A speed that is NaN or infinite gives 0.
+/// Amplitudes are returned unchecked.
 pub fn amplitude_v<T: Real>(
     first_rpm: T,
     step_rpm: T,

@@ -1,10 +1,11 @@
 //! The ECU's dither schedules.
 //!
-//! Made by `sim-host schedule --from 1000 --to 2000 --step 25 --square-to 0.15 --sine-to 1.35 --amplitudes 30
-//! --margin 0.25 --transient 150 --time 200 --out FILE`; not to be edited by hand. Parameters: the paper's (preset `reconstruction`).
+//! Made by `sim-host schedule --from 1000 --to 2000 --step 25 --square-to 0.15 --sine-to 1.35
+//! --amplitudes 30 --margin 0.25 --transient 150 --time 200 --out FILE`; not to be edited by hand.
+//! Parameters: the paper's (preset `reconstruction`).
 //!
-//! Behind each amplitude stands its speed, and the range of amplitudes in which motions from both starts have period one or
-//! rest, there and at the neighbouring speeds.
+//! Behind each amplitude stands its speed, and the range of amplitudes in which motions from both
+//! starts have period one or rest, there and at the neighbouring speeds.
 
 use crate::schedule::Schedule;
 

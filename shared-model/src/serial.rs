@@ -83,7 +83,8 @@ impl Deframer {
 }
 
 fn unpack<'a>(framed: &[u8], plain: &'a mut [u8; FRAMED_MAX]) -> Option<&'a [u8]> {
-    // The compiler cannot exclude a panic of the crate's decoder of slices; it can for the decoder of single bytes.
+    // The compiler cannot exclude a panic of the crate's decoder of slices; it can for the decoder
+    // of single bytes.
     let mut decoder = cobs::CobsDecoder::new(plain);
     let mut length = None;
     for &byte in framed.iter().chain(&[0]) {

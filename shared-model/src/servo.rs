@@ -1,7 +1,7 @@
 //! Servo drive: volts to PWM duty and back.
 //!
-//! A full bridge at duty d puts the mean voltage (2 d - 1) V_bus on the servo, so half duty is neutral. The timer counts
-//! the duty in whole steps of its period.
+//! A full bridge at duty d puts the mean voltage (2 d - 1) V_bus on the servo, so half duty is
+//! neutral. The timer counts the duty in whole steps of its period.
 
 use crate::Real;
 use crate::parameter::parameters;
@@ -21,13 +21,15 @@ parameters! {
 }
 
 impl<T: Real> Servo<T> {
-    /// Counts of the timer in one carrier period, rounded; 0 and values over 65535 do not fit a timer.
+    /// Counts of the timer in one carrier period, rounded; 0 and values over 65535 do not fit a
+    /// timer.
     pub fn period_counts(&self, pwm_rate_hz: T) -> u32 {
         (self.timer_clock_hz / pwm_rate_hz + T::from_f64(0.5)).to_u32()
     }
 }
 
-/// Duty cycle as the timer has it: `code` counts high out of `period`. The code is never above the period.
+/// Duty cycle as the timer has it: `code` counts high out of `period`. The code is never above the
+/// period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Duty {
     code: u16,
@@ -110,8 +112,8 @@ pub struct Pwm<T> {
 }
 
 impl<T: Real> Pwm<T> {
-    /// The PWM of a servo at the given carrier frequency. A period that fits no 16-bit timer is cut to 65535 counts;
-    /// [`Scenario::validate`](crate::Scenario::validate) refuses it before.
+    /// The PWM of a servo at the given carrier frequency. A period that fits no 16-bit timer is cut
+    /// to 65535 counts; [`Scenario::validate`](crate::Scenario::validate) refuses it before.
     pub fn new(servo: &Servo<T>, pwm_rate_hz: T) -> Self {
         let period = u16::try_from(servo.period_counts(pwm_rate_hz)).unwrap_or(u16::MAX);
         let midpoint = T::from_f64(0.5) * T::from_u32(period.into());
@@ -122,7 +124,8 @@ impl<T: Real> Pwm<T> {
         }
     }
 
-    /// The duty nearest to `volts`; outside the bus voltage it saturates, and NaN gives the neutral duty.
+    /// The duty nearest to `volts`; outside the bus voltage it saturates, and NaN gives the neutral
+    /// duty.
     ///
     /// ```
     /// use shared_model::{Scenario, servo::Pwm};

@@ -1,4 +1,5 @@
-//! Scenarios as text, one setting `section.name=value` per word: they reach the ECU without a rebuild.
+//! Scenarios as text, one setting `section.name=value` per word: they reach the ECU without a
+//! rebuild.
 
 use crate::Real;
 use crate::dither::{Application, Dither, Waveform};
@@ -91,7 +92,8 @@ impl fmt::Display for SettingError {
 impl core::error::Error for SettingError {}
 
 impl<T: Real> Scenario<T> {
-    /// Least and greatest allowed value of the number `section.name`; `None` if there is none of that name.
+    /// Least and greatest allowed value of the number `section.name`; `None` if there is none of
+    /// that name.
     ///
     /// ```
     /// use shared_model::Scenario;
@@ -116,8 +118,9 @@ impl<T: Real> Scenario<T> {
 }
 
 impl<T: Real + FromStr> Scenario<T> {
-    /// Takes one setting: `preset=NAME`, which replaces everything before it, or `section.name=value`. The value's range is
-    /// not checked here but by [`validate`](Self::validate), once all settings are in.
+    /// Takes one setting: `preset=NAME`, which replaces everything before it, or
+    /// `section.name=value`. The value's range is not checked here but by
+    /// [`validate`](Self::validate), once all settings are in.
     ///
     /// # Errors
     /// If there is no such parameter, or the value is not one for it.
@@ -147,7 +150,8 @@ impl<T: Real + FromStr> Scenario<T> {
     fn set_number(&mut self, key: &str, value: &str) -> Result<(), SettingError> {
         let (section, name) = key.rsplit_once('.').ok_or(SettingError::UnknownKey)?;
         let parsed = value.parse();
-        // The key is checked first: a misspelt choice, whose value is no number, is reported as an unknown key.
+        // The key is checked first: a misspelt choice, whose value is no number, is reported as an
+        // unknown key.
         let mut changed = *self;
         let number = parsed.as_ref().map_or(T::zero(), |&number| number);
         let known = match section {

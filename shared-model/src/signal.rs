@@ -63,7 +63,8 @@ pub struct Actuation<T> {
     pub motor_voltage_v: T,
     /// Amplitude of the dither on the servo voltage, V.
     pub dither_amplitude_v: T,
-    /// Wheel speed that the vehicle must not exceed, rpm: lowered in the safe state, where nothing suppresses the chaos.
+    /// Wheel speed that the vehicle must not exceed, rpm: lowered in the safe state, where nothing
+    /// suppresses the chaos.
     pub wheel_speed_limit_rpm: T,
     /// Events that were detected and tolerated since the last frame, one bit each.
     pub warnings: u16,

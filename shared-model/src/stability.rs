@@ -1,28 +1,32 @@
 //! The fixed step against the model's fastest rate.
 //!
-//! A Runge-Kutta step of fourth order is stable as long as step times rate stays within its region of stability (E. Hairer,
-//! G. Wanner, Solving Ordinary Differential Equations II, section IV.2). Beyond it the numerical solution diverges where the
-//! motion itself decays. Rates are bounded by the eigenvalues of the model linearised over the slopes that its tyres have.
+//! A Runge-Kutta step of fourth order is stable as long as step times rate stays within its region
+//! of stability (E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section IV.2).
+//! Beyond it the numerical solution diverges where the motion itself decays. Rates are bounded by
+//! the eigenvalues of the model linearised over the slopes that its tyres have.
 
 use crate::tire::Tire;
 use crate::vehicle::Model;
 use crate::{Real, Scenario};
 
-/// Greatest step times rate: the half disc of this radius on the left of the imaginary axis is within the region of
-/// stability.
+/// Greatest step times rate: the half disc of this radius on the left of the imaginary axis is
+/// within the region of stability.
 pub const MAX_STEP_TIMES_RATE: f64 = 2.6;
-/// Least rate of the fixed step that is stable with a model's fastest rate, Hz: a whole number, as the rates must be.
+/// Least rate of the fixed step that is stable with a model's fastest rate, Hz: a whole number, as
+/// the rates must be.
 pub fn min_rate_hz(fastest_rate_per_s: f64) -> f64 {
     libm::ceil(fastest_rate_per_s / MAX_STEP_TIMES_RATE)
 }
 
-/// Squarings of a matrix whose norm then bounds the greatest eigenvalue: the bound is less than a percent high.
+/// Squarings of a matrix whose norm then bounds the greatest eigenvalue: the bound is less than a
+/// percent high.
 const SQUARINGS: u32 = 10;
 
 type Matrix = nalgebra::Matrix4<f64>;
 
-/// Bound on the model's fastest rate, 1/s: the greatest magnitude of an eigenvalue of (14), linearised with every pair of
-/// slopes that the tyres of the two axles may have, their dither included.
+/// Bound on the model's fastest rate, 1/s: the greatest magnitude of an eigenvalue of (14),
+/// linearised with every pair of slopes that the tyres of the two axles may have, their dither
+/// included.
 ///
 /// ```
 /// let scenario = shared_model::Scenario::<f64>::reconstruction();
@@ -48,9 +52,9 @@ pub fn fastest_rate_per_s<T: Real>(scenario: &Scenario<T>) -> f64 {
 
 /// Least and greatest slope of a tyre, N/rad.
 ///
-/// A cubic tyre has k1 at no slip, and -2 k1 where its force is zero again: motions stay between the two. The dither
-/// takes 3 k2 W^2 from k1 at most. The Magic Formula's slope is bounded by its stiffness, B C D max(1, |1 - E|), either
-/// way.
+/// A cubic tyre has k1 at no slip, and -2 k1 where its force is zero again: motions stay between
+/// the two. The dither takes 3 k2 W^2 from k1 at most. The Magic Formula's slope is bounded by its
+/// stiffness, B C D max(1, |1 - E|), either way.
 fn slopes<T: Real>(tire: &Tire<T>, amplitude_rad: T) -> [f64; 2] {
     match tire {
         Tire::Cubic(tire) => {
@@ -77,7 +81,8 @@ fn slopes<T: Real>(tire: &Tire<T>, amplitude_rad: T) -> [f64; 2] {
     }
 }
 
-/// The right-hand side (14) linearised, with given slopes of the tyres, N/rad. Dry friction is constant within its modes.
+/// The right-hand side (14) linearised, with given slopes of the tyres, N/rad. Dry friction is
+/// constant within its modes.
 fn jacobian<T: Real>(model: &Model<T>, front: f64, rear: f64) -> Matrix {
     let c = model.constants();
     let (front_lever_s, rear_lever_s) = (c.front_lever_s.to_f64(), c.rear_lever_s.to_f64());
@@ -106,10 +111,11 @@ fn jacobian<T: Real>(model: &Model<T>, front: f64, rear: f64) -> Matrix {
     )
 }
 
-/// Bound on the magnitude of the greatest eigenvalue: the root of the norm of a power (I. Gelfand). The power is scaled
-/// at each squaring, so that no number overflows.
+/// Bound on the magnitude of the greatest eigenvalue: the root of the norm of a power (I. Gelfand).
+/// The power is scaled at each squaring, so that no number overflows.
 fn greatest_eigenvalue(matrix: Matrix) -> f64 {
-    // `power`, scaled, is the matrix to the power of `exponent`, whose norm is `bound` to that power times its own.
+    // `power`, scaled, is the matrix to the power of `exponent`, whose norm is `bound` to that
+    // power times its own.
     let mut power = matrix;
     let mut bound = 1.0;
     let mut exponent = 1.0;

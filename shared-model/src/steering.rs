@@ -27,7 +27,8 @@ parameters! {
 }
 
 impl<T: Real> Steering<T> {
-    /// Torque of the motor about the steering axis, r_s tau_M with tau_M = k_M i_M eta, N m, equations (10) and (11).
+    /// Torque of the motor about the steering axis, r_s tau_M with tau_M = k_M i_M eta, N m,
+    /// equations (10) and (11).
     ///
     /// ```
     /// let steering = shared_model::Scenario::<f64>::reconstruction().steering;

@@ -1,8 +1,9 @@
 //! Bulk telemetry: the ECU's record of a run, to the bit.
 //!
-//! A stream is one header, one record per model step, and one trailer. Each is a tag byte, a body in little-endian order and
-//! a CRC-16, so that a flipped bit is found where it is and a stream that was cut short lacks its trailer. The numbers of
-//! the state are their bits: nothing is rounded on the way.
+//! A stream is one header, one record per model step, and one trailer. Each is a tag byte, a body
+//! in little-endian order and a CRC-16, so that a flipped bit is found where it is and a stream
+//! that was cut short lacks its trailer. The numbers of the state are their bits: nothing is
+//! rounded on the way.
 
 use crate::MAX_RATIO;
 use crate::friction::FrictionMode;
@@ -68,7 +69,8 @@ pub struct Trailer {
     pub exit_code: u32,
     /// Records written.
     pub records: u32,
-    /// Records or duty codes lost because a ring was full, and control tasks that were not done when due again.
+    /// Records or duty codes lost because a ring was full, and control tasks that were not done
+    /// when due again.
     pub overruns: u32,
     /// Deepest use of the stack, bytes.
     pub stack_bytes: u32,
@@ -76,8 +78,8 @@ pub struct Trailer {
     pub final_duty: u16,
     /// Duty code of no voltage.
     pub neutral_duty: u16,
-    /// Shortest interval from one PWM interrupt to the next, counts of the cost clock, saturated; above the longest where
-    /// there is none.
+    /// Shortest interval from one PWM interrupt to the next, counts of the cost clock, saturated;
+    /// above the longest where there is none.
     pub min_interval: u16,
     /// Longest interval from one PWM interrupt to the next, counts of the cost clock, saturated.
     pub max_interval: u16,
@@ -149,7 +151,8 @@ impl fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// Writes a frame's bytes one after the other; what does not fit the buffer is dropped, and the frame then has length 0.
+/// Writes a frame's bytes one after the other; what does not fit the buffer is dropped, and the
+/// frame then has length 0.
 struct Writer<'a> {
     buffer: &'a mut [u8],
     length: usize,
@@ -259,7 +262,8 @@ impl<'a> Reader<'a> {
 }
 
 impl Header {
-    /// Writes the frame into `buffer`; returns its length, or 0 if the buffer is shorter than [`HEADER_LEN`].
+    /// Writes the frame into `buffer`; returns its length, or 0 if the buffer is shorter than
+    /// [`HEADER_LEN`].
     pub fn encode(&self, buffer: &mut [u8]) -> usize {
         let mut writer = Writer::new(buffer, HEADER_TAG);
         writer.u16(VERSION);
@@ -320,7 +324,8 @@ impl Header {
 }
 
 impl Record {
-    /// Writes the frame with its duty codes into `buffer`; returns its length, or 0 if it does not fit.
+    /// Writes the frame with its duty codes into `buffer`; returns its length, or 0 if it does not
+    /// fit.
     ///
     /// ```
     /// use shared_model::telemetry::{Record, record_len};
@@ -372,7 +377,8 @@ impl Record {
 }
 
 impl Trailer {
-    /// Writes the frame into `buffer`; returns its length, or 0 if the buffer is shorter than [`TRAILER_LEN`].
+    /// Writes the frame into `buffer`; returns its length, or 0 if the buffer is shorter than
+    /// [`TRAILER_LEN`].
     pub fn encode(&self, buffer: &mut [u8]) -> usize {
         let mut writer = Writer::new(buffer, TRAILER_TAG);
         writer.u32(self.exit_code);

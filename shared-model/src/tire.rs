@@ -1,6 +1,7 @@
 //! Tyres: cornering force against slip angle.
 //!
-//! The sign is the paper's: D > 0, so that the force has the sign of the slip angle and its cubic term bounds it.
+//! The sign is the paper's: D > 0, so that the force has the sign of the slip angle and its cubic
+//! term bounds it.
 
 use crate::Real;
 use crate::dither::{Injection, SineMean};
@@ -58,7 +59,8 @@ impl<T: Real> MagicFormula<T> {
     }
 
     /// Cornering force with the dither ahead of it: its mean by quadrature of (23).
-    // Out of line: it is long, and would keep the cubic tyre's few instructions from being put where they are needed.
+    // Out of line: it is long, and would keep the cubic tyre's few instructions from being put
+    // where they are needed.
     #[inline(never)]
     fn dithered_force(&self, mean: &SineMean<T>, alpha: T, injection: Injection<T>) -> T {
         match injection {
@@ -75,8 +77,8 @@ impl<T: Real> MagicFormula<T> {
 /// Coefficients of Table 1: front and rear axle.
 pub type Road = (MagicFormula<f64>, MagicFormula<f64>);
 
-/// Set A of Table 1. The table calls it the high-friction road, but (D_f + D_r)/(m g) is 0.29: this is the low-friction
-/// road that the paper's results are about.
+/// Set A of Table 1. The table calls it the high-friction road, but (D_f + D_r)/(m g) is 0.29: this
+/// is the low-friction road that the paper's results are about.
 pub const LOW_FRICTION_ROAD: Road = (
     MagicFormula {
         stiffness_per_rad: 11.275,
@@ -92,8 +94,8 @@ pub const LOW_FRICTION_ROAD: Road = (
     },
 );
 
-/// Set B of Table 1, (D_f + D_r)/(m g) = 0.81. Its front tyre's cubic coefficient is negative: with the cubic tyre the
-/// motion diverges.
+/// Set B of Table 1, (D_f + D_r)/(m g) = 0.81. Its front tyre's cubic coefficient is negative: with
+/// the cubic tyre the motion diverges.
 pub const HIGH_FRICTION_ROAD: Road = (
     MagicFormula {
         stiffness_per_rad: 6.7651,
@@ -147,7 +149,8 @@ impl<T: Real> CubicTire<T> {
         }
     }
 
-    /// The tyre that a slip angle meets on average under the mean of a dither; a held sample moves the slip angle instead.
+    /// The tyre that a slip angle meets on average under the mean of a dither; a held sample moves
+    /// the slip angle instead.
     #[inline(always)]
     pub fn averaged(&self, injection: Injection<T>) -> Self {
         match injection {
@@ -159,9 +162,10 @@ impl<T: Real> CubicTire<T> {
         }
     }
 
-    /// The tyre that a dithered slip angle meets on average. The mean of the cube under a zero-mean dither of mean square
-    /// W^2 (square) or W^2/2 (sine) adds 3 k2 alpha times that to the linear term, so the mean is a cubic tyre again:
-    /// (21) gives k1 - 3 k2 W^2, (23) gives k1 - 1.5 k2 W^2.
+    /// The tyre that a dithered slip angle meets on average. The mean of the cube under a zero-mean
+    /// dither of mean square W^2 (square) or W^2/2 (sine) adds 3 k2 alpha times that to the
+    /// linear term, so the mean is a cubic tyre again: (21) gives k1 - 3 k2 W^2, (23) gives k1
+    /// - 1.5 k2 W^2.
     ///
     /// ```
     /// use shared_model::tire::CubicTire;
@@ -218,8 +222,8 @@ impl<T: Real> Tire<T> {
         }
     }
 
-    /// Cornering force (N) at slip angle `alpha` (rad), with the dither ahead of the nonlinearity: closed form for the
-    /// cubic tyre, quadrature of (23) for the Magic Formula.
+    /// Cornering force (N) at slip angle `alpha` (rad), with the dither ahead of the nonlinearity:
+    /// closed form for the cubic tyre, quadrature of (23) for the Magic Formula.
     #[inline(always)]
     pub fn force(&self, alpha: T, injection: Injection<T>) -> T {
         match self {

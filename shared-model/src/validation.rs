@@ -139,7 +139,8 @@ pub enum InvalidScenario {
         /// Greatest length, s.
         max_s: f64,
     },
-    /// The dither is faster than half the PWM rate, so its samples would have another frequency (aliasing).
+    /// The dither is faster than half the PWM rate, so its samples would have another frequency
+    /// (aliasing).
     DitherFrequency {
         /// The requested frequency, rad/s.
         frequency_rad_per_s: f64,
@@ -155,7 +156,8 @@ pub enum InvalidScenario {
         /// Bus voltage, V.
         bus_v: f64,
     },
-    /// The fixed step is too long for the model's fastest rate: its solution would grow where the motion decays.
+    /// The fixed step is too long for the model's fastest rate: its solution would grow where the
+    /// motion decays.
     StepTooLong {
         /// Name of the rate that the model is stepped at.
         field: &'static str,

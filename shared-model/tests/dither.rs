@@ -1,4 +1,5 @@
-//! Dither: the oscillator's frequency, phase and samples, and the quadrature of the mean over a sine.
+//! Dither: the oscillator's frequency, phase and samples, and the quadrature of the mean over a
+//! sine.
 
 use proptest::prelude::*;
 use shared_model::dither::{Dither, OSCILLATOR_SINE_ERROR, Oscillator, SineMean, Waveform};
@@ -113,7 +114,8 @@ fn oscillator_sine_error_is_as_stated() {
     );
 }
 
-/// The approximation joins pieces at the quadrants' edges: the floats next to them have no wild values.
+/// The approximation joins pieces at the quadrants' edges: the floats next to them have no wild
+/// values.
 #[test]
 fn oscillator_sine_at_the_edges() {
     for edge in [-PI, -FRAC_PI_2, 0.0, FRAC_PI_2, PI] {
@@ -127,7 +129,8 @@ fn oscillator_sine_at_the_edges() {
     }
 }
 
-/// The mean of a polynomial of degree 31 is exact with 16 nodes: for u^30 it is the central binomial over 2^30.
+/// The mean of a polynomial of degree 31 is exact with 16 nodes: for u^30 it is the central
+/// binomial over 2^30.
 #[test]
 fn quadrature_is_exact_for_polynomials() {
     let mean = SineMean::<f64>::new();
@@ -151,16 +154,17 @@ fn quadrature_is_exact_for_polynomials() {
     }
 }
 
-/// Mean of `f` over a sine by brute force: the trapezoidal rule over a period, which converges as fast as the function
-/// is smooth.
+/// Mean of `f` over a sine by brute force: the trapezoidal rule over a period, which converges as
+/// fast as the function is smooth.
 fn sine_mean(f: impl Fn(f64) -> f64, y: f64, amplitude: f64) -> f64 {
     const POINTS: u32 = 4096;
     let at = |k: u32| f(y + amplitude * libm::sin((f64::from(k) + 0.5) / f64::from(POINTS) * TAU));
     (0..POINTS).map(at).sum::<f64>() / f64::from(POINTS)
 }
 
-/// Largest error of the mean of set A's Magic Formulas, in units of the peak force, by dither amplitude. The formula has
-/// poles beside the real axis, the rear tyre's the nearer ones, so the error grows fast with the amplitude.
+/// Largest error of the mean of set A's Magic Formulas, in units of the peak force, by dither
+/// amplitude. The formula has poles beside the real axis, the rear tyre's the nearer ones, so the
+/// error grows fast with the amplitude.
 #[test]
 fn quadrature_of_the_magic_formula() {
     for (amplitude_rad, bound) in [(0.05, 2e-14), (0.1, 1e-11), (0.2, 1e-6), (0.3, 2e-5)] {

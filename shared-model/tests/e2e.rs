@@ -1,4 +1,5 @@
-//! End-to-end protection: every status by its sequence, every flipped bit, foreign frames, the counter's wrap-around.
+//! End-to-end protection: every status by its sequence, every flipped bit, foreign frames, the
+//! counter's wrap-around.
 
 use proptest::prelude::*;
 use shared_model::e2e::{Receiver, Sender, Status};
@@ -31,7 +32,8 @@ fn frames(numbers: std::ops::Range<usize>) -> Vec<FrameBytes> {
     all[numbers].to_vec()
 }
 
-/// The statuses of a new receiver that gets the sender's frames of those numbers, or nothing, one after the other.
+/// The statuses of a new receiver that gets the sender's frames of those numbers, or nothing, one
+/// after the other.
 fn statuses(received: &[Option<usize>]) -> Vec<Status> {
     let frames = frames(0..600);
     let mut receiver = receiver();
@@ -49,7 +51,8 @@ fn every_status_by_its_sequence() {
         (&[0, 3, 4], &[Ok, OkSomeLost, Ok]),
         (&[0, 4, 5], &[Ok, WrongSequence, Ok]),
         (&[0, 0, 1], &[Ok, Repeated, Ok]),
-        // Swapped: a counter below the last one is out of sequence, and so the tolerated step counts from there.
+        // Swapped: a counter below the last one is out of sequence, and so the tolerated step
+        // counts from there.
         (&[0, 2, 1, 3], &[Ok, OkSomeLost, WrongSequence, OkSomeLost]),
         // Before the first frame the receiver expects a sender that has just started.
         (&[2, 3], &[OkSomeLost, Ok]),
@@ -131,7 +134,8 @@ fn damage_and_silence_leave_the_counter() {
     assert_eq!(receiver.check(Some(&frames[1])), Status::Ok);
 }
 
-/// The result of the package autosar-e2e 1.0.0 for zeros; `tests/frames.rs` compares frames of all kinds with it.
+/// The result of the package autosar-e2e 1.0.0 for zeros; `tests/frames.rs` compares frames of all
+/// kinds with it.
 #[test]
 fn known_answers() {
     let mut sender = Sender::new(DATA_ID);

@@ -138,7 +138,8 @@ fn starts_with_the_first_frame_and_tells_it() {
     }
 }
 
-/// The result of a tick is put out from the next one on: the duties of its periods, the frame with the last of them.
+/// The result of a tick is put out from the next one on: the duties of its periods, the frame with
+/// the last of them.
 #[test]
 fn a_command_acts_one_tick_later() {
     let pwm = Pwm::new(&scenario().servo, 10_000.0);
@@ -312,8 +313,8 @@ fn control_that_is_late_is_found() {
     assert_safe(&rig.good_tick(10.0), Fault::ControlLate);
 }
 
-/// A voltage that comes out of the control task with a flipped bit, in either channel: found in the same tick, and what goes
-/// out meanwhile lies between neutral and the right duty.
+/// A voltage that comes out of the control task with a flipped bit, in either channel: found in the
+/// same tick, and what goes out meanwhile lies between neutral and the right duty.
 #[test]
 fn every_flipped_bit_of_a_setpoint_is_found_and_harmless() {
     for request_a in [10.0, -10.0, 0.0] {

@@ -1,4 +1,5 @@
-//! Sensor and actuator frames: bytes at their promised places, round trip bit by bit, every flipped bit found.
+//! Sensor and actuator frames: bytes at their promised places, round trip bit by bit, every flipped
+//! bit found.
 
 use proptest::prelude::*;
 use shared_model::e2e::{Receiver, Sender, Status};
@@ -40,7 +41,8 @@ fn receiver(data_id: u16) -> Receiver {
     Receiver::new(data_id, MAX_DELTA_COUNTER)
 }
 
-/// The first frame of a sender is good, is found to be damaged whichever bit is flipped, and is none of the other kind.
+/// The first frame of a sender is good, is found to be damaged whichever bit is flipped, and is
+/// none of the other kind.
 fn check_protection(
     frame: &FrameBytes,
     data_id: u16,

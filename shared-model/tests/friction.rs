@@ -221,7 +221,8 @@ fn sticks<T: Real>(
     let limit = scenario
         .friction
         .limit_nm(scenario.steering.pneumatic_trail_m);
-    // The same with friction that nothing here breaks loose: where the steering would be if it stuck.
+    // The same with friction that nothing here breaks loose: where the steering would be if it
+    // stuck.
     scenario.friction.coefficient = T::from_f64(10.0);
     scenario.friction.front_wheel_load_kg = T::from_f64(1e5);
     let held = Model::new(&scenario);

@@ -1,4 +1,5 @@
-//! The gate at the control rate: commands, time, modes and the safe state. Sensors and samples have tests of their own.
+//! The gate at the control rate: commands, time, modes and the safe state. Sensors and samples have
+//! tests of their own.
 
 use proptest::prelude::*;
 use shared_model::Scenario;

@@ -38,8 +38,9 @@ fn distance(a: Vector4<f64>, b: Vector4<f64>) -> f64 {
         .fold(0.0, |greatest, d| d.abs().max(greatest))
 }
 
-/// A second of smooth motion: halving the step divides the difference to the next finer run by 2^4. The steps are short
-/// against the fastest time constant (J_w/b_w = 50 ms) and the differences large against rounding (some 1e-15).
+/// A second of smooth motion: halving the step divides the difference to the next finer run by 2^4.
+/// The steps are short against the fastest time constant (J_w/b_w = 50 ms) and the differences
+/// large against rounding (some 1e-15).
 fn assert_fourth_order(scenario: &Scenario<f64>, injection: Injection<f64>) {
     let runs = [250, 500, 1000, 2000].map(|steps| end(scenario, 1.0, steps, injection).x);
     let differences = [0, 1, 2].map(|k| distance(runs[k], runs[k + 1]));
@@ -60,7 +61,8 @@ fn fourth_order_without_friction() {
     assert_fourth_order(&scenario, Injection::SquareMean { amplitude: 0.1 });
 }
 
-/// A sine ahead of the friction's sign makes it smooth as long as the rate stays within the dither's, here 640 rad/s.
+/// A sine ahead of the friction's sign makes it smooth as long as the rate stays within the
+/// dither's, here 640 rad/s.
 #[test]
 fn fourth_order_with_smoothed_friction() {
     let mut scenario = Scenario::reconstruction();
@@ -69,8 +71,8 @@ fn fourth_order_with_smoothed_friction() {
     assert_fourth_order(&scenario, Injection::SineMean { amplitude: 0.16 });
 }
 
-/// With events the single error depends on where in its step an event falls; the trend over many step lengths is the order.
-/// Four seconds of stick-slip motion at 1750 rpm, against steps of 2 us.
+/// With events the single error depends on where in its step an event falls; the trend over many
+/// step lengths is the order. Four seconds of stick-slip motion at 1750 rpm, against steps of 2 us.
 #[test]
 fn second_order_with_stick_and_slip() {
     let scenario = Scenario::reconstruction();
@@ -90,7 +92,8 @@ fn second_order_with_stick_and_slip() {
     assert!(order > 1.8, "order {order}");
 }
 
-/// A steering without tyres and motor: J w' = -b w - tau_c sign(w), whose decay to rest has a closed form.
+/// A steering without tyres and motor: J w' = -b w - tau_c sign(w), whose decay to rest has a
+/// closed form.
 fn free_steering(inertia: f64, damping: f64, coefficient: f64, rate: f64) -> Scenario<f64> {
     let mut scenario = Scenario::reconstruction();
     scenario.tires.front.peak_n = 0.0;
@@ -105,8 +108,8 @@ fn free_steering(inertia: f64, damping: f64, coefficient: f64, rate: f64) -> Sce
     scenario
 }
 
-/// Time and angle at which the free steering comes to rest: T = (J/b) ln(1 + b w0/tau_c), and from the integral of the
-/// equation of motion, J w0 = b delta + tau_c T.
+/// Time and angle at which the free steering comes to rest: T = (J/b) ln(1 + b w0/tau_c), and from
+/// the integral of the equation of motion, J w0 = b delta + tau_c T.
 fn rest(scenario: &Scenario<f64>) -> (f64, f64) {
     let (inertia, damping) = (
         scenario.steering.inertia_kg_m2,
@@ -198,15 +201,17 @@ proptest! {
     }
 }
 
-/// The steering breaks loose in the middle of a step, where the tyres' growing torque passes the friction's limit, and not
-/// only at the next step: the rate after the step is that of steps a thousand times as short.
+/// The steering breaks loose in the middle of a step, where the tyres' growing torque passes the
+/// friction's limit, and not only at the next step: the rate after the step is that of steps a
+/// thousand times as short.
 #[test]
 fn release_is_within_the_step() {
     let step_s = 1e-3;
     for share in [0.1, 0.3, 0.5, 0.7] {
         let mut scenario = Scenario::<f64>::reconstruction();
         (scenario.run.sideslip_rad, scenario.run.steering_angle_rad) = (0.05, 0.05);
-        // Without motor the steering sticks; how the torque grows in the step does not depend on the motor.
+        // Without motor the steering sticks; how the torque grows in the step does not depend on
+        // the motor.
         let per_ampere = scenario.steering.motor_torque_nm() / scenario.steering.motor_current_a;
         scenario.steering.motor_current_a = 0.0;
         let torque =
@@ -229,7 +234,8 @@ fn release_is_within_the_step() {
     }
 }
 
-/// Straight ahead without motor current is an equilibrium, under every law and mean dither, to the bit.
+/// Straight ahead without motor current is an equilibrium, under every law and mean dither, to the
+/// bit.
 #[test]
 fn straight_ahead_stays() {
     let injections = [
@@ -255,8 +261,9 @@ fn straight_ahead_stays() {
     }
 }
 
-/// A cornering equilibrium built by hand: slip angles chosen, front tyre scaled so that the yaw moments balance, motor so
-/// that it balances the self-aligning torque. The right-hand side vanishes there, so the state stays.
+/// A cornering equilibrium built by hand: slip angles chosen, front tyre scaled so that the yaw
+/// moments balance, motor so that it balances the self-aligning torque. The right-hand side
+/// vanishes there, so the state stays.
 #[test]
 fn cornering_equilibrium_stays() {
     let mut scenario = Scenario::<f64>::reconstruction();
@@ -292,8 +299,9 @@ fn cornering_equilibrium_stays() {
     assert!(drift < 1e-11, "drifted by {drift}");
 }
 
-/// The f32 model has the same bits in every run, on every machine and at every optimisation level: firmware and host are
-/// compared by them. Who changes the arithmetic on purpose writes the new bits here.
+/// The f32 model has the same bits in every run, on every machine and at every optimisation level:
+/// firmware and host are compared by them. Who changes the arithmetic on purpose writes the new
+/// bits here.
 #[test]
 fn f32_bits_repeat() {
     let mut scenario = Scenario::<f32>::reconstruction();

@@ -32,7 +32,8 @@ fn setpoint(dither_amplitude_v: f32) -> Setpoint<f32> {
     }
 }
 
-/// Runs a dither that sets in at sample `onset`; the sample at which a fault is found, counted from there.
+/// Runs a dither that sets in at sample `onset`; the sample at which a fault is found, counted from
+/// there.
 fn found(scenario: &Scenario<f32>, onset: u32, samples: u32) -> Option<u32> {
     let mut oscillator = Oscillator::new(&scenario.dither, scenario.run.pwm_rate_hz);
     let mut limiter = Limiter::new(scenario, NEUTRAL_CODE);
@@ -134,7 +135,8 @@ fn a_frequency_a_sample_outside_is_found_in_its_first_period() {
                     if samples < 1.3
                         || shortest <= 2.0 && samples < shortest && waveform == Waveform::Sine
                     {
-                        // The limit itself is next to half the PWM rate: a faster sine shows its beat, see below.
+                        // The limit itself is next to half the PWM rate: a faster sine shows its
+                        // beat, see below.
                         continue;
                     }
                     let scenario = scenario(waveform, pwm_rate_hz, frequency);
@@ -151,7 +153,8 @@ fn a_frequency_a_sample_outside_is_found_in_its_first_period() {
     }
 }
 
-/// Between the limit and the next whole number of samples it takes until the samples have drifted by one.
+/// Between the limit and the next whole number of samples it takes until the samples have drifted
+/// by one.
 #[test]
 fn a_frequency_barely_outside_is_found_by_its_drift() {
     for waveform in WAVEFORMS {
@@ -175,8 +178,8 @@ fn a_frequency_barely_outside_is_found_by_its_drift() {
     }
 }
 
-/// Runs half periods of these many samples, the first one positive, at amplitude 0.1 V; the fault and the sample it comes
-/// at.
+/// Runs half periods of these many samples, the first one positive, at amplitude 0.1 V; the fault
+/// and the sample it comes at.
 fn squares(limiter: &mut Limiter<f32>, half_periods: &[u32]) -> Option<u32> {
     let signs = half_periods.iter().zip([1.0, -1.0].into_iter().cycle());
     let samples = signs.flat_map(|(&samples, sign)| std::iter::repeat_n(sign, samples as usize));

@@ -9,7 +9,8 @@ use shared_model::{InvalidScenario, Scenario, integrate};
 const WAVEFORMS: [Waveform; 3] = [Waveform::None, Waveform::Square, Waveform::Sine];
 const APPLICATIONS: [Application; 2] = [Application::Averaged, Application::Signal];
 
-/// A run whose dither sets in at 20 ms: 20 steps of the averaged model, 200 of the one that sees the signal.
+/// A run whose dither sets in at 20 ms: 20 steps of the averaged model, 200 of the one that sees
+/// the signal.
 fn scenario(waveform: Waveform, application: Application) -> Scenario<f32> {
     let mut scenario = Scenario::<f32>::reconstruction();
     let dither = &mut scenario.dither;
@@ -37,7 +38,8 @@ fn duties(scenario: &Scenario<f32>, periods: usize) -> (Vec<Duty>, Vec<usize>) {
     (duties, counts)
 }
 
-/// Ten PWM periods of 10 kHz a step of the averaged model's 1 kHz; one where the model runs at the PWM's rate.
+/// Ten PWM periods of 10 kHz a step of the averaged model's 1 kHz; one where the model runs at the
+/// PWM's rate.
 #[test]
 fn samples_per_step() {
     for scenario in all() {
@@ -51,8 +53,9 @@ fn samples_per_step() {
     }
 }
 
-/// The PWM carries the same voltage whichever way the model takes the dither: nothing but the motor's before the start
-/// time, then one sample of the oscillator a period, its first at phase zero in the very period of the start.
+/// The PWM carries the same voltage whichever way the model takes the dither: nothing but the
+/// motor's before the start time, then one sample of the oscillator a period, its first at phase
+/// zero in the very period of the start.
 #[test]
 fn duty_is_motor_plus_dither() {
     const START: usize = 200;
@@ -81,7 +84,8 @@ fn duty_is_motor_plus_dither() {
         let (least, greatest) = (*seen.iter().min().unwrap(), *seen.iter().max().unwrap());
         match scenario.dither.waveform {
             Waveform::None => assert_eq!((least, greatest), (1563, 1563)),
-            // 0.5 V are 52.08 counts. The sine's samples, 15.7 a turn, come within 1 % of its peaks.
+            // 0.5 V are 52.08 counts. The sine's samples, 15.7 a turn, come within 1 % of its
+            // peaks.
             Waveform::Square => assert_eq!((least, greatest), (1510, 1615)),
             Waveform::Sine => assert!(least.abs_diff(1510) <= 1 && greatest.abs_diff(1615) <= 1),
         }
@@ -97,7 +101,8 @@ fn duty_is_motor_plus_dither() {
     }
 }
 
-/// Half turns of the square wave: 2000 rad/s at 10 kHz are 31.4 samples a turn, so the halves have 15 or 16.
+/// Half turns of the square wave: 2000 rad/s at 10 kHz are 31.4 samples a turn, so the halves have
+/// 15 or 16.
 #[test]
 fn square_has_its_frequency() {
     let (duties, _) = duties(&scenario(Waveform::Square, Application::Averaged), 10_200);
@@ -125,7 +130,8 @@ fn integrated(scenario: &Scenario<f32>, steps: u32) -> Vec<State<f32>> {
     let mut oscillator = Oscillator::new(&scenario.dither, 10e3_f32);
     let start = scenario.dither_start_step();
     let step = |k| {
-        // Before the start the model sees no dither. Then: its mean, or the sample of this very step.
+        // Before the start the model sees no dither. Then: its mean, or the sample of this very
+        // step.
         let injection = if k < start {
             Injection::Off
         } else {

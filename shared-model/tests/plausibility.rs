@@ -200,7 +200,8 @@ fn speed_and_yaw_rate_fit_the_road() {
     }
 }
 
-/// The steering turns at 1 rad/s in steps of a tick, the yaw rate as given; returns the tick at which something is found.
+/// The steering turns at 1 rad/s in steps of a tick, the yaw rate as given; returns the tick at
+/// which something is found.
 fn turned(wheel_speed_rpm: f32, sign: f32, yaw_rate: impl Fn(u32) -> f32) -> Option<(u32, Faults)> {
     let mut watch = watch(&limits());
     (0..1000).find_map(|tick| {

@@ -28,8 +28,8 @@ macro_rules! each_section {
     };
 }
 
-/// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and run. The sections'
-/// lists and the map of a scenario are both held to it.
+/// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and
+/// run. The sections' lists and the map of a scenario are both held to it.
 const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 5 + 24 + 8;
 
 /// The floats next to a bound.
@@ -56,8 +56,8 @@ impl Neighbours for f64 {
     }
 }
 
-/// Every number of a section: a value that is not finite or not in its range is refused with a message that names it; the
-/// bounds themselves are allowed. Returns how many there are.
+/// Every number of a section: a value that is not finite or not in its range is refused with a
+/// message that names it; the bounds themselves are allowed. Returns how many there are.
 fn ranges<T: Neighbours, P: ParameterSet<T>>(
     section: &'static str,
     of: fn(&mut Scenario<T>) -> &mut P,
@@ -210,7 +210,8 @@ fn rates_must_fit_together() {
     assert_eq!(refusal(&["run.control_rate_hz=10000"]), "accepted");
 }
 
-/// The presets' 25 MHz timer: 16 bits hold no carrier below 381.5 Hz, and two counts are the least duty resolution.
+/// The presets' 25 MHz timer: 16 bits hold no carrier below 381.5 Hz, and two counts are the least
+/// duty resolution.
 #[test]
 fn carrier_must_fit_the_timer() {
     let counts = |counts| {
@@ -284,7 +285,8 @@ fn voltage_must_fit_the_bus() {
     );
 }
 
-/// Damping over inertia is 4000 1/s; at 1 rpm the tyres are faster than that; and 9 rad of dither make them as stiff.
+/// Damping over inertia is 4000 1/s; at 1 rpm the tyres are faster than that; and 9 rad of dither
+/// make them as stiff.
 #[test]
 fn the_step_must_be_stable() {
     let stiff = "steering.inertia_kg_m2=0.05";
@@ -333,7 +335,8 @@ fn steps_and_samples_follow_the_rates() {
     );
 }
 
-/// f32 holds the length of a long run to no better than its 24 bits, but the count of its steps is the nearest one.
+/// f32 holds the length of a long run to no better than its 24 bits, but the count of its steps is
+/// the nearest one.
 #[test]
 fn long_runs_have_the_nearest_count() {
     let mut scenario = Scenario::<f32>::reconstruction();

@@ -1,4 +1,5 @@
-//! The dither's schedule as the ECU looks it up: at and between its speeds, beyond them, and with numbers that are none.
+//! The dither's schedule as the ECU looks it up: at and between its speeds, beyond them, and with
+//! numbers that are none.
 
 use proptest::prelude::*;
 use shared_model::schedule::{Schedule, amplitude_v};

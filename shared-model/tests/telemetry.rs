@@ -77,8 +77,8 @@ fn encode_trailer(trailer: &Trailer) -> Vec<u8> {
     buffer.to_vec()
 }
 
-/// Every single-bit flip is refused; every cut is reported with the bytes that are missing; a longer stream after the
-/// frame does not matter.
+/// Every single-bit flip is refused; every cut is reported with the bytes that are missing; a
+/// longer stream after the frame does not matter.
 fn check_damage<F>(
     frame: &[u8],
     decode: impl Fn(&[u8]) -> Result<F, FrameError>,
@@ -155,7 +155,8 @@ proptest! {
     }
 }
 
-/// A frame's bytes with the given ones changed and its checksum made right again: what another program would send.
+/// A frame's bytes with the given ones changed and its checksum made right again: what another
+/// program would send.
 fn forged(mut frame: Vec<u8>, changes: &[(usize, u8)]) -> Vec<u8> {
     for &(place, byte) in changes {
         frame[place] = byte;
@@ -192,7 +193,8 @@ fn lengths_are_the_constants() {
     );
 }
 
-/// The format is a promise to readers in other languages: little-endian, bytes at fixed places, CRC-16/IBM-3740.
+/// The format is a promise to readers in other languages: little-endian, bytes at fixed places,
+/// CRC-16/IBM-3740.
 #[test]
 fn record_bytes_are_as_promised() {
     let frame = encode_record(&RECORD, &[0x0a09]);

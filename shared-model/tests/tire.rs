@@ -1,4 +1,5 @@
-//! Tyres: symmetry, the cubic tyre against the Magic Formula, Table 1, and the effective tyre against brute force.
+//! Tyres: symmetry, the cubic tyre against the Magic Formula, Table 1, and the effective tyre
+//! against brute force.
 
 use proptest::prelude::*;
 use shared_model::Real;
@@ -31,14 +32,15 @@ fn model() -> impl Strategy<Value = TireModel> {
     prop::sample::select(vec![TireModel::Cubic, TireModel::MagicFormula])
 }
 
-/// Sum of the magnitudes that a cubic tyre's force is made of, N: what its rounding error is relative to.
+/// Sum of the magnitudes that a cubic tyre's force is made of, N: what its rounding error is
+/// relative to.
 fn cubic_magnitude(tire: &MagicFormula<f64>, slip: f64) -> f64 {
     let cubic = tire.cubic();
     cubic.linear_n_per_rad.abs() * slip + cubic.cubic_n_per_rad3.abs() * slip * slip * slip
 }
 
-/// Mean over a sine by brute force: the midpoint rule over a period, which for a smooth periodic function converges
-/// faster than any power of the number of points.
+/// Mean over a sine by brute force: the midpoint rule over a period, which for a smooth periodic
+/// function converges faster than any power of the number of points.
 fn sine_mean(f: impl Fn(f64) -> f64, y: f64, amplitude: f64) -> f64 {
     const POINTS: u32 = 4096;
     let at = |k: u32| f(y + amplitude * libm::sin((f64::from(k) + 0.5) / f64::from(POINTS) * TAU));
@@ -156,8 +158,9 @@ proptest! {
     }
 }
 
-/// Cubic and Magic Formula agree up to the third order, both being odd, so that the difference falls with the fifth power
-/// of the slip. The slips are small against the formula's poles and large against rounding.
+/// Cubic and Magic Formula agree up to the third order, both being odd, so that the difference
+/// falls with the fifth power of the slip. The slips are small against the formula's poles and
+/// large against rounding.
 #[test]
 fn cubic_differs_in_the_fifth_order() {
     for axle in AXLES {
@@ -172,7 +175,8 @@ fn cubic_differs_in_the_fifth_order() {
     }
 }
 
-/// Cornering stiffness: the derivative at zero slip is k1 = B C D, also of the mean of a weak dither.
+/// Cornering stiffness: the derivative at zero slip is k1 = B C D, also of the mean of a weak
+/// dither.
 #[test]
 fn slope_at_zero_is_k1() {
     let slip = 1e-6;
@@ -194,7 +198,8 @@ fn slope_at_zero_is_k1() {
     }
 }
 
-/// Table 1 names the sets the wrong way round: the one it calls high-friction carries 0.29 of the weight, the other 0.81.
+/// Table 1 names the sets the wrong way round: the one it calls high-friction carries 0.29 of the
+/// weight, the other 0.81.
 #[test]
 fn road_labels_are_swapped_in_print() {
     const WEIGHT_N: f64 = 1500.0 * 9.81;
@@ -203,7 +208,8 @@ fn road_labels_are_swapped_in_print() {
     assert!((grip(HIGH_FRICTION_ROAD) - 0.81).abs() < 0.005, "set B");
 }
 
-/// Set B's front tyre stiffens: its cubic tyre does not bound the force, so that the motion diverges.
+/// Set B's front tyre stiffens: its cubic tyre does not bound the force, so that the motion
+/// diverges.
 #[test]
 fn set_b_front_cubic_is_negative() {
     assert!(HIGH_FRICTION_ROAD.0.cubic().cubic_n_per_rad3 < 0.0);

@@ -1,5 +1,5 @@
-//! Times of the Taylor engine on the jobs that `benches/peers` gives other integrators, and how near they are to the machine's
-//! limit.
+//! Times of the Taylor engine on the jobs that `benches/peers` gives other integrators, and how
+//! near they are to the machine's limit.
 
 use clap::Parser;
 use dynamics::map::cell::{Cell, cells};
@@ -21,14 +21,16 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-/// Times of the Taylor engine on jobs S, L, F and M (see benches/peers/README.md), and the share of the machine's peak. Job E is S
-/// with exact slip angles, G with the Magic Formula; the fixed step's time and error stand beside them.
+/// Times of the Taylor engine on jobs S, L, F and M (see benches/peers/README.md), and the share of
+/// the machine's peak. Job E is S with exact slip angles, G with the Magic Formula; the fixed
+/// step's time and error stand beside them.
 #[derive(Parser)]
 struct Arguments {
     /// Runs of each job
     #[arg(long, default_value_t = 5)]
     runs: usize,
-    /// One JSON object per run of S, L and F, as `benches/peers/run --own` takes them; no M, no roofline
+    /// One JSON object per run of S, L and F, as `benches/peers/run --own` takes them; no M, no
+    /// roofline
     #[arg(long)]
     json: bool,
     /// Cells of job M's map in each direction
@@ -204,7 +206,8 @@ fn spread(seconds: &[f64]) -> String {
     format!("{:.4} ({least:.4} to {most:.4})", sorted[sorted.len() / 2])
 }
 
-/// The states at 10 s: to 18 digits and more for the peers' jobs, by the reference integrator for the others.
+/// The states at 10 s: to 18 digits and more for the peers' jobs, by the reference integrator for
+/// the others.
 fn reference(job: Job) -> Vec<[f64; 4]> {
     if Job::ANALYTIC.contains(&job) {
         let end = |scenario: &Scenario<f64>| {
@@ -304,7 +307,8 @@ fn print_json(row: &Measured) {
     }
 }
 
-/// Floating-point operations of the recurrences and of the state behind a step; choosing the step is not counted.
+/// Floating-point operations of the recurrences and of the state behind a step; choosing the step
+/// is not counted.
 fn flops(tangents: usize) -> usize {
     let of_order = |n: usize| {
         let square = 2 * (n / 2 + 1) + 1;
@@ -316,7 +320,8 @@ fn flops(tangents: usize) -> usize {
     sums + (1 + tangents) * 4 * 2 * ORDER
 }
 
-/// Share of the peak that was reached, the peak measured by the same instruction set on this machine, now.
+/// Share of the peak that was reached, the peak measured by the same instruction set on this
+/// machine, now.
 fn roofline(measured: &[Measured], one: &rayon::ThreadPool) {
     let peak = one.install(|| Arch::new().dispatch(Peak));
     println!(
@@ -361,7 +366,8 @@ impl WithSimd for Peak {
     }
 }
 
-/// Job M: the cells of a map over wheel speed and amplitude, tile by tile, on one thread and on two.
+/// Job M: the cells of a map over wheel speed and amplitude, tile by tile, on one thread and on
+/// two.
 fn map(cells_a_side: usize) {
     let axis = |from, to| Grid {
         from,

@@ -7,7 +7,8 @@ pub const PRIORITIES: [Priority; 5] = [
     priority("main program", &["Reset"]),
     priority("control task", &["PendSV"]),
     priority("PWM interrupt", &["SysTick", "DefaultHandler"]),
-    // HardFault itself moves the stack pointer back to the top; this is counted all the same as if it lay below the others.
+    // HardFault itself moves the stack pointer back to the top; this is counted all the same as if
+    // it lay below the others.
     priority("hard fault", &["end_hard_fault"]),
     priority("watchdog", &["NonMaskableInt"]),
 ];

@@ -1,4 +1,5 @@
-//! The paper's claims and its errata, as data: S.-C. Chang, "On controlling a chaotic vehicle dynamic system by using dither".
+//! The paper's claims and its errata, as data: S.-C. Chang, "On controlling a chaotic vehicle
+//! dynamic system by using dither".
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
-//! The command line as a user meets it: bad input gets a clear message with the value and its bounds, exit code 2, and nothing
-//! is lost or overwritten.
+//! The command line as a user meets it: bad input gets a clear message with the value and its
+//! bounds, exit code 2, and nothing is lost or overwritten.
 
 mod common;
 
@@ -107,7 +107,8 @@ fn options_are_checked() {
     );
 }
 
-/// What a step cannot follow is refused when the scenario is accepted, or named when the run shows it; never as a motion that diverges.
+/// What a step cannot follow is refused when the scenario is accepted, or named when the run shows
+/// it; never as a motion that diverges.
 #[test]
 fn a_step_that_is_too_long_is_no_divergence() {
     assert_config_refused(
@@ -141,7 +142,8 @@ fn a_step_that_is_too_long_is_no_divergence() {
     );
 }
 
-/// Friction of no torque: the steering comes to rest smoothly, and all methods and analyses agree on it.
+/// Friction of no torque: the steering comes to rest smoothly, and all methods and analyses agree
+/// on it.
 #[test]
 fn a_smooth_rest_without_friction_is_an_equilibrium() {
     let folder = folder();

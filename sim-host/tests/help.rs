@@ -1,6 +1,8 @@
-//! The examples of all help texts, run in sequence in one empty folder, as a reader would copy them.
+//! The examples of all help texts, run in sequence in one empty folder, as a reader would copy
+//! them.
 //!
-//! Examples that need the firmware must reach its missing file; long examples must begin their work.
+//! Examples that need the firmware must reach its missing file; long examples must begin their
+//! work.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;

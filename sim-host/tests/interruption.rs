@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 /// A job is in its loops by then.
 const RUNNING: Duration = Duration::from_millis(400);
-/// It ends within a second; the test waits longer only to report a failure on a slow machine as one.
+/// It ends within a second; the test waits longer only to report a failure on a slow machine as
+/// one.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 fn start(arguments: &[&str], folder: &std::path::Path) -> Child {

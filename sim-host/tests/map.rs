@@ -1,4 +1,5 @@
-//! The map: the same bytes however it is made, against the analysis of single motions, and bad input.
+//! The map: the same bytes however it is made, against the analysis of single motions, and bad
+//! input.
 
 mod common;
 
@@ -96,8 +97,8 @@ fn tiles_of_another_plan_or_damaged_ones_are_refused() {
     assert_refused(at, "map merge empty --out o.csv", &["empty has no tiles"]);
 }
 
-/// Whatever digit of a tile is edited, and whatever its plan says with a check sum that fits: no number goes into a result, and
-/// none is counted by.
+/// Whatever digit of a tile is edited, and whatever its plan says with a check sum that fits: no
+/// number goes into a result, and none is counted by.
 #[test]
 fn edited_tiles_are_refused() {
     let folder = folder();

@@ -1,4 +1,5 @@
-//! Outputs of the command line: all checked before the work, written or refused, and never silently lost.
+//! Outputs of the command line: all checked before the work, written or refused, and never silently
+//! lost.
 
 mod common;
 
@@ -7,7 +8,8 @@ use std::fs::{self, File};
 use std::path::Path;
 use std::process::Stdio;
 
-/// Each subcommand that writes files, with the options that name them. What they read need not be there: outputs come first.
+/// Each subcommand that writes files, with the options that name them. What they read need not be
+/// there: outputs come first.
 const WRITERS: [(&str, &[&str]); 20] = [
     ("simulate", &["--out"]),
     ("lyapunov", &["--out", "--json", "--figure"]),
@@ -172,7 +174,8 @@ fn a_full_disk_is_an_error_on_standard_output_too() {
     }
 }
 
-/// A reader that has seen enough of the summary is no failure; one that takes not all of the data is.
+/// A reader that has seen enough of the summary is no failure; one that takes not all of the data
+/// is.
 #[test]
 fn a_closed_pipe() {
     let folder = folder();

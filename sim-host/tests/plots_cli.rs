@@ -1,5 +1,5 @@
-//! The subcommands that plot, as a user meets them: files with named columns and units, and bad input refused with value and
-//! bounds, exit code 2, nothing written.
+//! The subcommands that plot, as a user meets them: files with named columns and units, and bad
+//! input refused with value and bounds, exit code 2, nothing written.
 
 mod common;
 
@@ -53,7 +53,8 @@ fn written(arguments: &[&str]) -> Written {
     }
 }
 
-/// Runs a command with all its destinations, expects exit code 2, all of `parts` in the message, and no file.
+/// Runs a command with all its destinations, expects exit code 2, all of `parts` in the message,
+/// and no file.
 fn assert_refused(arguments: &[&str], parts: &[&str]) {
     let folder = folder();
     let mut all = arguments.to_vec();

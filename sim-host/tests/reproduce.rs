@@ -92,7 +92,8 @@ fn stopped_resumed_and_made_at_once_give_the_same_files() {
     assert!(text.starts_with("wheel_speed_rpm,yaw_rate_maximum_rad_per_s"));
     assert!(!text.contains("NaN"));
 
-    // A digit was changed in the data of the second part and in the record of the third: both are computed again.
+    // A digit was changed in the data of the second part and in the record of the third: both are
+    // computed again.
     kept.lock()
         .expect("no thread panics while it is locked")
         .clear();

@@ -1,4 +1,5 @@
-//! The dither's schedule: the ECU's table against the analysis, the number of threads, and bad input.
+//! The dither's schedule: the ECU's table against the analysis, the number of threads, and bad
+//! input.
 
 mod common;
 
@@ -37,7 +38,8 @@ fn analysis(waveform: Waveform, plan: &Plan) -> Analysis {
     made.expect("it is not interrupted")
 }
 
-/// An entry needs its neighbours' ranges, so of three speeds the middle one is as in the whole table.
+/// An entry needs its neighbours' ranges, so of three speeds the middle one is as in the whole
+/// table.
 #[test]
 fn the_ecus_table_is_what_the_analysis_gives() {
     for (waveform, greatest_v, table, around_rpm) in [
@@ -54,7 +56,8 @@ fn the_ecus_table_is_what_the_analysis_gives() {
         assert!(entry.amplitude_v - range.from_v >= made.room_v);
         assert!(range.to_v - entry.amplitude_v >= made.room_v);
         assert_eq!(made.failed_checks().count(), 0, "{:?}", made.checks);
-        // The paper's attractor is of period one at each of them, from the other start there may be rest.
+        // The paper's attractor is of period one at each of them, from the other start there may be
+        // rest.
         assert_eq!(made.checks.len(), 5);
     }
 }
@@ -64,8 +67,8 @@ fn entry_of(table: &Schedule<f32, POINTS>, rpm: f64) -> f32 {
     table.amplitudes_v[place.to_u32() as usize]
 }
 
-/// The undithered motion of period one at 1500 rpm and rest on the other lobe need no dither; nothing is to be found where
-/// the range of amplitudes ends below the least good one.
+/// The undithered motion of period one at 1500 rpm and rest on the other lobe need no dither;
+/// nothing is to be found where the range of amplitudes ends below the least good one.
 #[test]
 fn no_dither_where_none_is_needed_and_none_where_none_helps() {
     let calm = analysis(Waveform::Square, &plan(1500.0, 1500.0, 0.01));

@@ -1,4 +1,5 @@
-//! The subcommands that sweep, as a user meets them: bad input, the same bytes for any number of threads, no NaN.
+//! The subcommands that sweep, as a user meets them: bad input, the same bytes for any number of
+//! threads, no NaN.
 
 mod common;
 

@@ -54,8 +54,9 @@ impl Figure {
     }
 }
 
-/// Compares figures with the file `name`, and every figure with its limit. With another compiler than the file's, which
-/// makes other code, names and limits alone are compared, and a message reports that the figures were not.
+/// Compares figures with the file `name`, and every figure with its limit. With another compiler
+/// than the file's, which makes other code, names and limits alone are compared, and a message
+/// reports that the figures were not.
 ///
 /// # Panics
 /// If a figure is above its limit, is missing, or differs.

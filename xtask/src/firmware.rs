@@ -25,12 +25,14 @@ pub fn boards() -> Result<Vec<String>> {
     Ok(boards)
 }
 
-/// Builds the firmware's programs that `selection` names for a board, or all of them for `["--bins"]`.
+/// Builds the firmware's programs that `selection` names for a board, or all of them for
+/// `["--bins"]`.
 pub fn build(toolchain: &str, board: &str, selection: &[&str]) -> Result<()> {
     process::run(cargo(toolchain, "build", board)?.args(selection))
 }
 
-/// A command of cargo on the firmware for a board, in the firmware's folder, where its own configuration holds.
+/// A command of cargo on the firmware for a board, in the firmware's folder, where its own
+/// configuration holds.
 pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
     cargo_into(toolchain, command, board, &target_dir(board)?)
 }
@@ -71,10 +73,12 @@ fn cargo_for_target(toolchain: &str, command: &str, target_dir: &Path) -> Result
     Ok(cargo)
 }
 
-/// A build of the ECU's program with a section `.stack_sizes`, the frame of each function, in a folder of its own.
+/// A build of the ECU's program with a section `.stack_sizes`, the frame of each function, in a
+/// folder of its own.
 ///
-/// The option is not stable yet. For one crate alone it may still be used, and as that crate's compilation makes the
-/// code of all others, too, the frames are those of the whole program. The code is that of [`build`].
+/// The option is not stable yet. For one crate alone it may still be used, and as that crate's
+/// compilation makes the code of all others, too, the frames are those of the whole program. The
+/// code is that of [`build`].
 pub fn framed(toolchain: &str, board: &str) -> Result<Command> {
     let mut cargo = cargo_into(toolchain, "rustc", board, &framed_target_dir(board)?)?;
     cargo

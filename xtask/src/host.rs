@@ -88,7 +88,8 @@ impl Apt {
         (io::stdin().is_terminal() && process::find("sudo").is_some()).then_some(Self::Sudo)
     }
 
-    /// Fetches the lists of packages. A source that fails is no reason to stop: another may have the package.
+    /// Fetches the lists of packages. A source that fails is no reason to stop: another may have
+    /// the package.
     pub fn update(self) -> Result<()> {
         if !process::status(self.apt_get().args(["-q", "update"]))?.success() {
             println!("   apt-get update did not fetch everything; continuing with the known lists");
@@ -96,7 +97,8 @@ impl Apt {
         Ok(())
     }
 
-    /// Installs a package; before that fetches the lists of packages where they lack it, or name files that are gone.
+    /// Installs a package; before that fetches the lists of packages where they lack it, or name
+    /// files that are gone.
     pub fn bring(self, package: &str) -> Result<()> {
         if candidate(package).is_some() && self.install(&[package]).is_ok() {
             return Ok(());
@@ -115,7 +117,8 @@ impl Apt {
     }
 
     fn apt_get(self) -> Command {
-        // Through `env`, as sudo passes no environment on; and another apt-get may hold the lock for a while.
+        // Through `env`, as sudo passes no environment on; and another apt-get may hold the lock
+        // for a while.
         let words = [
             "env",
             "DEBIAN_FRONTEND=noninteractive",

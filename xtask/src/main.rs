@@ -1,7 +1,7 @@
 //! The single door to the repository: `cargo xtask <command>`.
 //!
-//! It installs missing tools, builds, and starts programs. It contains no model: every verdict comes from the program
-//! that it starts.
+//! It installs missing tools, builds, and starts programs. It contains no model: every verdict
+//! comes from the program that it starts.
 
 mod doctor;
 mod firmware;
@@ -41,7 +41,8 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Shows the required tools, which of them are installed, and the steps of `setup`; changes nothing.
+    /// Shows the required tools, which of them are installed, and the steps of `setup`; changes
+    /// nothing.
     ///
     /// Exit code 0 if everything is installed, 2 if something is missing.
     #[command(after_help = "Example:\n  cargo xtask doctor")]
@@ -49,16 +50,18 @@ enum Command {
 
     /// Installs missing tools and builds the runner.
     ///
-    /// Each installation is announced with its place before it begins. The compiler's target comes from rustup, or where
-    /// rustup cannot download, from Debian's Rust packages; QEMU comes from the system's packages. The runner is
-    /// the program that `cargo run` in firmware/ starts. Python packages for the tests go into
-    /// target/python; the system's Python is not changed.
+    /// Each installation is announced with its place before it begins. The compiler's target comes
+    /// from rustup, or where rustup cannot download, from Debian's Rust packages; QEMU comes
+    /// from the system's packages. The runner is the program that `cargo run` in firmware/
+    /// starts. Python packages for the tests go into target/python; the system's Python is not
+    /// changed.
     #[command(
         after_help = "Example:\n  cargo xtask setup && cd firmware && cargo run --profile firmware --bin ecu"
     )]
     Setup,
 
-    /// Sets up, builds, runs firmware and host against each other, and writes target/report/index.html.
+    /// Sets up, builds, runs firmware and host against each other, and writes
+    /// target/report/index.html.
     #[command(after_help = "Examples:\n  cargo xtask demo\n  \
                             cargo xtask demo -- --help   the options that may follow the two dashes")]
     Demo {
@@ -67,14 +70,15 @@ enum Command {
         args: Vec<String>,
     },
 
-    /// Sets up, builds the firmware with its proofs, and runs every test; stops at the first failure.
+    /// Sets up, builds the firmware with its proofs, and runs every test; stops at the first
+    /// failure.
     #[command(after_help = "Example:\n  cargo xtask test")]
     Test,
 
     /// Builds every board's firmware, and compares its proofs with tests/golden.
     ///
-    /// Panic-free link, worst stack, flash and RAM, instructions of the tasks, jitter of the interrupts, and a reason for
-    /// every `unsafe`.
+    /// Panic-free link, worst stack, flash and RAM, instructions of the tasks, jitter of the
+    /// interrupts, and a reason for every `unsafe`.
     #[command(after_help = "Examples:\n  cargo xtask proofs\n  \
                             cargo xtask proofs --overwrite-expected && git diff tests/golden")]
     Proofs {
@@ -83,13 +87,15 @@ enum Command {
         overwrite_expected: bool,
     },
 
-    /// Counts the instructions of the model's step and the ECU's tasks on the target, beside the C reference by GCC -O3.
+    /// Counts the instructions of the model's step and the ECU's tasks on the target, beside the C
+    /// reference by GCC -O3.
     ///
-    /// Fails if a bit of their outputs differs, or if Rust takes more. Needs arm-none-eabi-gcc; the error message names the
-    /// package.
+    /// Fails if a bit of their outputs differs, or if Rust takes more. Needs arm-none-eabi-gcc; the
+    /// error message names the package.
     #[command(after_help = "Example:\n  cargo xtask target-cost")]
     TargetCost {
-        /// Write the figures into tests/golden/cost.txt instead of comparing them; the limit still applies.
+        /// Write the figures into tests/golden/cost.txt instead of comparing them; the limit still
+        /// applies.
         #[arg(long)]
         overwrite_expected: bool,
     },
@@ -114,7 +120,8 @@ enum Command {
     #[command(after_help = "Example:\n  cargo xtask package")]
     Package,
 
-    /// Measures the line coverage of the model's tests; fails if a line of gate or controller is not covered.
+    /// Measures the line coverage of the model's tests; fails if a line of gate or controller is
+    /// not covered.
     ///
     /// Needs LLVM's llvm-profdata and llvm-cov; the error message names the package.
     #[command(after_help = "Example:\n  cargo xtask coverage")]
@@ -122,16 +129,18 @@ enum Command {
 
     /// Mutation tests of gate, controller and ECU program; fails if a mutation passes the tests.
     ///
-    /// Equivalent mutations are listed, with the reason, in shared-model/mutants-survivors.txt. Takes about half an
-    /// hour on two cores, so it is no part of `test`. Installs cargo-mutants into target/tools.
+    /// Equivalent mutations are listed, with the reason, in shared-model/mutants-survivors.txt.
+    /// Takes about half an hour on two cores, so it is no part of `test`. Installs
+    /// cargo-mutants into target/tools.
     #[command(after_help = "Example:\n  cargo xtask mutants")]
     Mutants,
 
-    /// Coverage-guided fuzzing of every reader of external data; fails at the first input that makes one panic, hang or
-    /// take too much memory.
+    /// Coverage-guided fuzzing of every reader of external data; fails at the first input that
+    /// makes one panic, hang or take too much memory.
     ///
-    /// Needs a C++ compiler for libFuzzer. Takes some hours, so it is no part of `test`, which runs the corpus and a fixed
-    /// number of mutations. Inputs found are kept in target/fuzz, and the next run continues from them.
+    /// Needs a C++ compiler for libFuzzer. Takes some hours, so it is no part of `test`, which runs
+    /// the corpus and a fixed number of mutations. Inputs found are kept in target/fuzz, and
+    /// the next run continues from them.
     #[command(
         after_help = "Examples:\n  cargo xtask fuzz telemetry\n  cargo xtask fuzz --inputs 100000"
     )]

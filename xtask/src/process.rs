@@ -24,7 +24,8 @@ pub enum Ended {
     TimedOut,
 }
 
-/// Runs a program to its end with its output shown as it comes; an error if it cannot start or does not succeed.
+/// Runs a program to its end with its output shown as it comes; an error if it cannot start or does
+/// not succeed.
 pub fn run(command: &mut Command) -> Result<()> {
     let line = display(command);
     let status = status(command)?;
@@ -44,8 +45,9 @@ pub fn status(command: &mut Command) -> Result<ExitStatus> {
 
 /// Runs a program with its output shown as it comes, and kills it when `limit` is over.
 ///
-/// On a terminal the program keeps the terminal, with its own progress bars and questions. In a log, its two
-/// streams go through one pipe, which keeps their order, and a long silence is broken by a line.
+/// On a terminal the program keeps the terminal, with its own progress bars and questions. In a
+/// log, its two streams go through one pipe, which keeps their order, and a long silence is broken
+/// by a line.
 pub fn stream(command: &mut Command, limit: Option<Duration>) -> Result<Ended> {
     println!("$ {}", display(command));
     let on_terminal = io::stdout().is_terminal() && io::stderr().is_terminal();

@@ -1,7 +1,7 @@
 //! Cargo and rustc of a chosen toolchain, through rustup.
 //!
-//! xtask itself was started by a cargo, which put its own toolchain and package into the environment. The programs that it
-//! starts must not inherit that.
+//! xtask itself was started by a cargo, which put its own toolchain and package into the
+//! environment. The programs that it starts must not inherit that.
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -72,7 +72,8 @@ pub fn require_pinned() -> Result<String> {
     Ok(pinned)
 }
 
-/// Removes the starting cargo's variables, and those of xtask's package, from a command's environment.
+/// Removes the starting cargo's variables, and those of xtask's package, from a command's
+/// environment.
 fn clean(mut command: Command) -> Command {
     for (name, _) in env::vars_os() {
         if name.to_str().is_some_and(describes_xtask) {

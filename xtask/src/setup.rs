@@ -8,7 +8,8 @@ pub mod target;
 
 use anyhow::Result;
 
-/// Installs the missing tools that build and run the firmware, and returns the toolchain that builds the firmware.
+/// Installs the missing tools that build and run the firmware, and returns the toolchain that
+/// builds the firmware.
 pub fn tools() -> Result<String> {
     let toolchain = target::ensure()?;
     qemu::ensure()?;

@@ -1,7 +1,8 @@
 //! No two source files of a crate use each other, directly or through others.
 //!
-//! A file uses another if a path in its code leads to an item that is defined there; re-exports are followed. Declaring a
-//! module and re-exporting from it is no use of it. Tests inside the sources do not count.
+//! A file uses another if a path in its code leads to an item that is defined there; re-exports are
+//! followed. Declaring a module and re-exporting from it is no use of it. Tests inside the sources
+//! do not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -162,7 +163,8 @@ impl Crate {
         if depth == 0 || (is_itself && import.len() == 1) {
             return None;
         }
-        // A name that an import of the same name begins with is a crate's or a child's, not the import.
+        // A name that an import of the same name begins with is a crate's or a child's, not the
+        // import.
         let is_child = self.files.contains_key(&child(module, name));
         if is_itself && !is_child {
             return None;

@@ -1,5 +1,5 @@
-//! Input of the ECU: a drive through the speed at which the dither starts, with frames that are lost, damaged and
-//! repeated, and a broken sensor towards its end.
+//! Input of the ECU: a drive through the speed at which the dither starts, with frames that are
+//! lost, damaged and repeated, and a broken sensor towards its end.
 
 use shared_model::dither::Injection;
 use shared_model::e2e::Sender;
@@ -70,7 +70,8 @@ impl Drive {
         }
     }
 
-    /// Bits in which the servo's pin shows another duty than was put out, in a PWM period: once in a while for one period.
+    /// Bits in which the servo's pin shows another duty than was put out, in a PWM period: once in
+    /// a while for one period.
     pub fn pin_error(period: u32) -> u16 {
         u16::from(period % 211 == 7)
     }

@@ -1,7 +1,8 @@
-//! Fault drill: the ECU's fault handlers, triggered on purpose. The first setting, `fault=NAME`, selects one.
+//! Fault drill: the ECU's fault handlers, triggered on purpose. The first setting, `fault=NAME`,
+//! selects one.
 //!
-//! `panic`, `hard-fault`, `stack-overflow`, `watchdog` (the main loop stops feeding it) and `hang` (interrupts and watchdog
-//! off, for the runner's time-out).
+//! `panic`, `hard-fault`, `stack-overflow`, `watchdog` (the main loop stops feeding it) and `hang`
+//! (interrupts and watchdog off, for the runner's time-out).
 
 #![no_std]
 #![no_main]

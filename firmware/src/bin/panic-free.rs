@@ -1,8 +1,10 @@
-//! Proof that the control path cannot panic: this image links only if no panic is reachable from its interrupts.
+//! Proof that the control path cannot panic: this image links only if no panic is reachable from
+//! its interrupts.
 //!
-//! The panic handler calls a function that is not defined. Where the optimiser finds every panic unreachable, the handler
-//! and its call vanish; otherwise the linker reports the function, whose name is the reason. The feature
-//! `reachable-panic` puts a panic into the path, to see that the proof can fail. The image is never run.
+//! The panic handler calls a function that is not defined. Where the optimiser finds every panic
+//! unreachable, the handler and its call vanish; otherwise the linker reports the function, whose
+//! name is the reason. The feature `reachable-panic` puts a panic into the path, to see that the
+//! proof can fail. The image is never run.
 
 #![no_std]
 #![no_main]

@@ -1,7 +1,8 @@
-//! Requirements on a board: a PWM, a clock for its interrupt, a watchdog, and a counter that measures the tasks.
+//! Requirements on a board: a PWM, a clock for its interrupt, a watchdog, and a counter that
+//! measures the tasks.
 //!
-//! A board is one folder here, with its code and its memory map, and one feature `board-<folder>`. The build takes exactly
-//! one. docs/porting.md leads through a port.
+//! A board is one folder here, with its code and its memory map, and one feature `board-<folder>`.
+//! The build takes exactly one. docs/porting.md leads through a port.
 
 mod systick;
 
@@ -25,15 +26,16 @@ pub trait Board {
     /// The servo's PWM.
     type Pwm: embedded_hal::pwm::SetDutyCycle;
 
-    /// Clock of the PWM's timer, Hz. A scenario whose `servo.timer_clock_hz` is another is refused: its carrier and all its
-    /// times would be off by the ratio.
+    /// Clock of the PWM's timer, Hz. A scenario whose `servo.timer_clock_hz` is another is refused:
+    /// its carrier and all its times would be off by the ratio.
     const TIMER_CLOCK_HZ: u32;
     /// Counts per second of [`cost_counter`](Self::cost_counter).
     const COST_CLOCK_HZ: u32;
     /// Instructions per second of a simulated core; 0 on silicon.
     const INSTRUCTION_RATE_HZ: u32;
 
-    /// Starts the PWM with a period of `period` counts at the neutral duty, and calls the SysTick exception once per period.
+    /// Starts the PWM with a period of `period` counts at the neutral duty, and calls the SysTick
+    /// exception once per period.
     ///
     /// # Errors
     /// If the period does not fit the timer, or the PWM is started already.
@@ -44,17 +46,20 @@ pub trait Board {
         systick::stop();
     }
 
-    /// Puts the PWM to the neutral duty at once. Works at any time and from any handler, also before it is started.
+    /// Puts the PWM to the neutral duty at once. Works at any time and from any handler, also
+    /// before it is started.
     fn neutralise_pwm();
 
-    /// Duty code that is on the PWM, and the neutral one; where there are registers, read back from them.
+    /// Duty code that is on the PWM, and the neutral one; where there are registers, read back from
+    /// them.
     fn pwm_output() -> (u16, u16);
 
     /// A free-running counter, upwards, of 32 bits.
     fn cost_counter() -> u32;
 
-    /// Starts the watchdog. When it is not fed for `timeout_ms`, it raises the non-maskable interrupt or, where it can only
-    /// do that, resets the chip, whose pins then leave the servo's bridge off.
+    /// Starts the watchdog. When it is not fed for `timeout_ms`, it raises the non-maskable
+    /// interrupt or, where it can only do that, resets the chip, whose pins then leave the
+    /// servo's bridge off.
     fn start_watchdog(timeout_ms: u32);
 
     /// Feeds the watchdog.

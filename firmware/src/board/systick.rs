@@ -2,7 +2,8 @@
 
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 
-/// Calls the SysTick exception every `period` clocks of the core, 2 to 65535, the first time in one period from now.
+/// Calls the SysTick exception every `period` clocks of the core, 2 to 65535, the first time in one
+/// period from now.
 pub fn start(timer: &mut SYST, period: u16) {
     timer.set_clock_source(SystClkSource::Core);
     timer.set_reload(u32::from(period) - 1);

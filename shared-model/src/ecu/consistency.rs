@@ -1,5 +1,6 @@
-//! Consistency of controller and gate: the gate must pass the controller's commands. Checked once, before the first tick,
-//! so that an inconsistent scenario is refused with the name of the number, and not by a later safe state.
+//! Consistency of controller and gate: the gate must pass the controller's commands. Checked once,
+//! before the first tick, so that an inconsistent scenario is refused with the name of the number,
+//! and not by a later safe state.
 
 use crate::dither::Waveform;
 use crate::ecu_schedule::Table;

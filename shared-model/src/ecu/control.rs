@@ -114,8 +114,8 @@ impl<T: Real> Channel<T> {
         (setpoint, actuation)
     }
 
-    /// The actuator frame. The safe state makes no further checks, so a wheel speed limit corrupted in one channel must not
-    /// be reported: the limit is the lower of both channels'.
+    /// The actuator frame. The safe state makes no further checks, so a wheel speed limit corrupted
+    /// in one channel must not be reported: the limit is the lower of both channels'.
     fn report(&mut self, own: &Actuation<T>, other: &Actuation<T>) -> (Actuation<T>, FrameBytes) {
         let limit_rpm = lower(own.wheel_speed_limit_rpm, other.wheel_speed_limit_rpm);
         let actuation = Actuation {
@@ -269,7 +269,8 @@ mod tests {
         }
     }
 
-    /// A flipped bit may change a frame's content and leave both channels equal: only the frames differ.
+    /// A flipped bit may change a frame's content and leave both channels equal: only the frames
+    /// differ.
     #[test]
     fn frames_that_differ_are_found_in_the_next_tick() {
         for channel in [0, 1] {

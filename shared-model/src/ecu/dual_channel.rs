@@ -1,5 +1,5 @@
-//! A task in two channels: the same program on two sets of parameters and state. Comparing the two detects a flipped bit in
-//! one of them.
+//! A task in two channels: the same program on two sets of parameters and state. Comparing the two
+//! detects a flipped bit in one of them.
 
 /// Two channels, which are equal unless memory is corrupted.
 #[derive(Debug, Clone, Copy)]

@@ -77,8 +77,8 @@ impl<T: Real> PwmTask<T> {
         let [a, b] = self.channels.both();
         let (a, b) = (a.begin(), b.begin());
         self.faults.add_if(a != b, Fault::ChannelsDiffer);
-        // Where the channels differ: of the two the duty nearer to neutral, and neutral itself if they lie on both sides
-        // of it.
+        // Where the channels differ: of the two the duty nearer to neutral, and neutral itself if
+        // they lie on both sides of it.
         let duty = self.neutral.median(a.duty, b.duty);
         self.channels
             .run(|channel| channel.limiter.expect(duty.code()));
@@ -88,7 +88,8 @@ impl<T: Real> PwmTask<T> {
         }
     }
 
-    /// Takes over what the control task computed in the last tick; for use where a control tick is due.
+    /// Takes over what the control task computed in the last tick; for use where a control tick is
+    /// due.
     pub fn accept(&mut self, output: &ControlOutput<T>) {
         self.channels
             .run_each(&output.setpoints, |channel, setpoint| {

@@ -19,8 +19,9 @@ struct HalfPeriod {
 
 /// The gate at the PWM rate.
 ///
-/// The frequency is judged by the whole number of samples in each half period, so it is known to one sample in that: at
-/// 10 kHz a limit of 5000 rad/s (6.28 samples) is found exceeded from 5240 rad/s (6 samples) upwards.
+/// The frequency is judged by the whole number of samples in each half period, so it is known to
+/// one sample in that: at 10 kHz a limit of 5000 rad/s (6.28 samples) is found exceeded from 5240
+/// rad/s (6 samples) upwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limiter<T> {
     /// Least and most samples in half a period of the dither.
@@ -42,7 +43,8 @@ impl<T: Real> Limiter<T> {
         let samples = |frequency: T| {
             T::from_f64(core::f64::consts::PI) * scenario.run.pwm_rate_hz / frequency
         };
-        // A half period falls between two whole numbers of samples, and may be off by the error of its ends.
+        // A half period falls between two whole numbers of samples, and may be off by the error of
+        // its ends.
         let shortest = samples(limits.dither_frequency_max_rad_per_s) * (T::one() - sample_error);
         let longest = samples(limits.dither_frequency_min_rad_per_s) * (T::one() + sample_error);
         Self {
@@ -55,8 +57,8 @@ impl<T: Real> Limiter<T> {
         }
     }
 
-    /// Servo voltage of a PWM period: the motor's share and the dither's sample, the latter only if it is within its
-    /// amplitude.
+    /// Servo voltage of a PWM period: the motor's share and the dither's sample, the latter only if
+    /// it is within its amplitude.
     pub fn run(&mut self, setpoint: &Setpoint<T>, dither_v: T) -> T {
         let amplitude_v = setpoint.dither_amplitude_v;
         // False for NaN.

@@ -1,9 +1,10 @@
-//! The command gate: independent limits on every command, and the safe state. It shares no code with the controller that it
-//! guards.
+//! The command gate: independent limits on every command, and the safe state. It shares no code
+//! with the controller that it guards.
 //!
-//! At the control rate a [`Supervisor`] judges sensors, time and the controller's command; at the PWM rate a [`Limiter`]
-//! judges each sample of the dither and the duty seen on the servo's pin. Any fault latches the safe state until restart:
-//! the dither is ramped out, the motor's share slews to zero, and a lower wheel speed is demanded.
+//! At the control rate a [`Supervisor`] judges sensors, time and the controller's command; at the
+//! PWM rate a [`Limiter`] judges each sample of the dither and the duty seen on the servo's pin.
+//! Any fault latches the safe state until restart: the dither is ramped out, the motor's share
+//! slews to zero, and a lower wheel speed is demanded.
 
 mod fault;
 mod limiter;

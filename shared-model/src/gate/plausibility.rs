@@ -14,7 +14,8 @@ pub struct Plausibility<T> {
     last: Option<Measurement<T>>,
     /// Control ticks since `last`.
     ticks: T,
-    /// Steering angle's change less the integral of the steering rate, forgotten exponentially, rad.
+    /// Steering angle's change less the integral of the steering rate, forgotten exponentially,
+    /// rad.
     contradiction_rad: T,
     /// Movement of the steering since the yaw rate last changed, rad.
     unanswered_steering_rad: T,
@@ -131,7 +132,8 @@ fn signals<T: Real>(measurement: &Measurement<T>) -> [T; 5] {
     ]
 }
 
-/// Zero, or of a size that a sensor can have: neither subnormal nor infinite in a frame's f32. False for NaN.
+/// Zero, or of a size that a sensor can have: neither subnormal nor infinite in a frame's f32.
+/// False for NaN.
 fn is_a_number<T: Real>(value: T) -> bool {
     let least = T::from_f64(f64::from(f32::MIN_POSITIVE));
     let most = T::from_f64(f64::from(f32::MAX));

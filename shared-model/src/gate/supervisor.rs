@@ -21,7 +21,8 @@ pub struct Observation<T> {
     pub motor_v: T,
     /// The controller's command: the dither's amplitude, V.
     pub dither_amplitude_v: T,
-    /// Faults found elsewhere: by the gate at the PWM rate, or by comparing the program's channels.
+    /// Faults found elsewhere: by the gate at the PWM rate, or by comparing the program's
+    /// channels.
     pub found_outside: Faults,
 }
 
@@ -119,7 +120,8 @@ impl<T: Real> Supervisor<T> {
         let mut faults = seen.found_outside;
         faults |= self.plausibility.check(seen.measurement.as_ref());
         faults |= self.command_faults(seen);
-        // Before the first frame the times since the last tick and frame are undefined; until then the servo is neutral.
+        // Before the first frame the times since the last tick and frame are undefined; until then
+        // the servo is neutral.
         if self.mode == Mode::Starting {
             return faults;
         }

@@ -111,8 +111,8 @@ impl<T: Real> Model<T> {
         let mut friction = scenario.friction;
         let friction_limit_nm = friction.limit_nm(steering.pneumatic_trail_m);
         if friction_limit_nm == T::zero() {
-            // A friction law without torque would only change modes without effect, endlessly where the steering comes to
-            // rest.
+            // A friction law without torque would only change modes without effect, endlessly where
+            // the steering comes to rest.
             friction.law = FrictionLaw::None;
         }
         let mut model = Self {
@@ -137,8 +137,8 @@ impl<T: Real> Model<T> {
         model
     }
 
-    /// Continues at another wheel speed N, rpm, for a speed that changes slowly: (14) holds it constant and has no term
-    /// in its rate.
+    /// Continues at another wheel speed N, rpm, for a speed that changes slowly: (14) holds it
+    /// constant and has no term in its rate.
     pub fn set_wheel_speed_rpm(&mut self, vehicle: &Vehicle<T>, wheel_speed_rpm: T) {
         let speed = vehicle.speed_m_per_s(wheel_speed_rpm);
         self.front_lever_s = vehicle.front_axle_distance_m / speed;
@@ -223,7 +223,8 @@ impl<T: Real> Model<T> {
         self.motor_torque_nm - self.trail_m * front
     }
 
-    /// Time derivative of the state vector, equation (14) with (24)'s effective nonlinearities, friction in `mode`.
+    /// Time derivative of the state vector, equation (14) with (24)'s effective nonlinearities,
+    /// friction in `mode`.
     #[inline(always)]
     pub fn derivative(
         &self,
@@ -255,7 +256,8 @@ impl<T: Real> Model<T> {
         )
     }
 
-    /// Index in the state vector of the friction law's argument: steering rate, or steering angle in the printed law.
+    /// Index in the state vector of the friction law's argument: steering rate, or steering angle
+    /// in the printed law.
     pub fn friction_argument(&self) -> usize {
         match self.friction.law {
             FrictionLaw::PrintedAngle => STEERING_ANGLE,
@@ -274,7 +276,8 @@ impl<T: Real> Model<T> {
         )
     }
 
-    /// The friction mode in which a step begins: at rest decided by the torques, else by the sign's argument.
+    /// The friction mode in which a step begins: at rest decided by the torques, else by the sign's
+    /// argument.
     pub fn mode_at(&self, x: &Vector4<T>, injection: Injection<T>) -> FrictionMode {
         let argument = x[self.friction_argument()];
         if argument == T::zero() && self.can_stick(injection) {
@@ -289,7 +292,8 @@ impl<T: Real> Model<T> {
         self.friction_limit_nm
     }
 
-    /// The steering comes to rest and may stick: Coulomb friction whose sign function is not dithered, or not yet.
+    /// The steering comes to rest and may stick: Coulomb friction whose sign function is not
+    /// dithered, or not yet.
     pub fn can_stick(&self, injection: Injection<T>) -> bool {
         let (lower, upper) = (T::zero(), T::zero());
         self.friction.law == FrictionLaw::CoulombRate

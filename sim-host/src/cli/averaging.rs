@@ -1,4 +1,5 @@
-//! `sim-host averaging`: comparison of the system under the true dither signal with the averaged system.
+//! `sim-host averaging`: comparison of the system under the true dither signal with the averaged
+//! system.
 
 use super::options::RunOptions;
 use super::outcome::Outcome;
@@ -8,9 +9,11 @@ use dynamics::averaging::{Comparison, chart, compare};
 use dynamics::words::Short;
 use shared_model::dither::Waveform;
 
-/// Compare the system under the true dither signal with the averaged system, as a function of the dither frequency.
+/// Compare the system under the true dither signal with the averaged system, as a function of the
+/// dither frequency.
 ///
-/// Each trajectory starts after a 200 s transient without dither. After a further transient of 20 s, 40 s are compared.
+/// Each trajectory starts after a 200 s transient without dither. After a further transient of 20
+/// s, 40 s are compared.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host averaging --dither square --amplitude-v 0.1
@@ -32,7 +35,8 @@ pub struct Arguments {
     destinations: Destinations,
 }
 
-/// Slower dither is not faster than the steering motion; faster dither needs a PWM rate that no timer has.
+/// Slower dither is not faster than the steering motion; faster dither needs a PWM rate that no
+/// timer has.
 const FREQUENCIES_RAD_PER_S: std::ops::RangeInclusive<f64> = 50.0..=100_000.0;
 const POINTS: std::ops::RangeInclusive<u32> = 1..=200;
 

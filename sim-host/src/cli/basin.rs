@@ -11,8 +11,8 @@ use serde::Serialize;
 
 /// Compute basins of attraction over a grid of initial sideslip and steering angles.
 ///
-/// The initial yaw rate and steering rate are those of the scenario. Initial states whose trajectory diverges are reported as
-/// diverging.
+/// The initial yaw rate and steering rate are those of the scenario. Initial states whose
+/// trajectory diverges are reported as diverging.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host basin --rpm 1750 --out basin.csv --figure basin.svg

@@ -4,7 +4,8 @@ use super::options::ConfigOptions;
 use super::outcome::Outcome;
 use dynamics::config::{to_commented_toml, validate};
 
-/// Print a complete, validated configuration as TOML. Names include units; comments give the allowed values.
+/// Print a complete, validated configuration as TOML. Names include units; comments give the
+/// allowed values.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host config > vehicle.toml        # the paper's vehicle, to edit

@@ -7,10 +7,12 @@ use anyhow::ensure;
 use dynamics::convergence::{chart, errors};
 use dynamics::words::Short;
 
-/// Compute the error of the ECU's fixed step relative to the reference integrator, as a function of the step.
+/// Compute the error of the ECU's fixed step relative to the reference integrator, as a function of
+/// the step.
 ///
-/// Both start from the scenario's initial state, with the dither on from time 0. The reference locates friction events to
-/// 1e-12 s. In chaos every error grows exponentially, so the comparison is meaningful for a few seconds only.
+/// Both start from the scenario's initial state, with the dither on from time 0. The reference
+/// locates friction events to 1e-12 s. In chaos every error grows exponentially, so the comparison
+/// is meaningful for a few seconds only.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host convergence                  # over 4 s, friction events included
@@ -22,7 +24,8 @@ pub struct Arguments {
     destinations: Destinations,
 }
 
-/// Default length of the trajectory, s; and the allowed lengths, after which an error is still meaningful.
+/// Default length of the trajectory, s; and the allowed lengths, after which an error is still
+/// meaningful.
 const TIME_S: f64 = 4.0;
 const TIMES_S: std::ops::RangeInclusive<f64> = 0.01..=60.0;
 

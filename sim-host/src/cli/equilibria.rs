@@ -11,11 +11,12 @@ use dynamics::words::{counted, counted_as};
 use serde::Serialize;
 use shared_model::vehicle::STEERING_ANGLE;
 
-/// Compute all equilibria at a wheel speed or over a range of speeds, with eigenvalues and stability, and the speeds of Hopf
-/// bifurcations.
+/// Compute all equilibria at a wheel speed or over a range of speeds, with eigenvalues and
+/// stability, and the speeds of Hopf bifurcations.
 ///
-/// The dither is averaged. Coulomb friction holds the steering in a band around each equilibrium, which is reported with it. The
-/// eigenvalues are those of the slipping mode beside the equilibrium; the JSON also contains those of the sticking mode.
+/// The dither is averaged. Coulomb friction holds the steering in a band around each equilibrium,
+/// which is reported with it. The eigenvalues are those of the slipping mode beside the
+/// equilibrium; the JSON also contains those of the sticking mode.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host equilibria --rpm 1750        # all of the paper's vehicle

@@ -18,7 +18,8 @@ use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-/// Times of injection from the manoeuvre's start, s: in the chaos without dither, settled under the dither, and later.
+/// Times of injection from the manoeuvre's start, s: in the chaos without dither, settled under the
+/// dither, and later.
 const TIMES_S: [f64; 3] = [2.5, 9.0, 14.5];
 const QUICK_TIMES_S: [f64; 1] = [9.0];
 /// Bit flips in each region of the memory.
@@ -29,9 +30,10 @@ const MAX_LISTED: usize = 20;
 
 /// Inject faults into the ECU in the loop, and compare every run with its fault-free run.
 ///
-/// Faults of sensors, links, servo and interrupts are injected on seven manoeuvres with the ECU's program on this host. Faults of
-/// memory and core are injected in a short run of the firmware in QEMU. A fault is undetected if no diagnostic is raised, but an
-/// output of the ECU differs or a corrupted value is in use. The run takes three to four minutes on 2 cores. The exit code is 1 if
+/// Faults of sensors, links, servo and interrupts are injected on seven manoeuvres with the ECU's
+/// program on this host. Faults of memory and core are injected in a short run of the firmware in
+/// QEMU. A fault is undetected if no diagnostic is raised, but an output of the ECU differs or a
+/// corrupted value is in use. The run takes three to four minutes on 2 cores. The exit code is 1 if
 /// an undetected fault has no waiver.
 #[derive(Args)]
 #[command(after_help = "Examples:

@@ -16,11 +16,12 @@ use serde::Serialize;
 use shared_model::Scenario;
 use std::time::{Duration, Instant};
 
-/// Estimate Lyapunov exponents at one speed or over a range of speeds, by three independent methods.
+/// Estimate Lyapunov exponents at one speed or over a range of speeds, by three independent
+/// methods.
 ///
-/// A positive largest exponent indicates chaos. The dither, if any, is averaged and on from the start. The results report
-/// trajectories that diverge and searches without a result. On Ctrl-C, points in progress are finished and the results so far are
-/// written.
+/// A positive largest exponent indicates chaos. The dither, if any, is averaged and on from the
+/// start. The results report trajectories that diverge and searches without a result. On Ctrl-C,
+/// points in progress are finished and the results so far are written.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host lyapunov --rpm 1750 --method all     # three methods side by side
@@ -37,7 +38,8 @@ pub struct Arguments {
     /// Method for the largest exponent
     #[arg(long, value_enum, default_value = "tangent")]
     method: Choice,
-    /// Estimate all four exponents by tangent dynamics, in addition to --method two-particle or synchronisation
+    /// Estimate all four exponents by tangent dynamics, in addition to --method two-particle or
+    /// synchronisation
     #[arg(long)]
     spectrum: bool,
     /// Initial transient to discard, s; the run is 1200 s including it, unless --time is given

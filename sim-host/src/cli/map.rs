@@ -1,4 +1,5 @@
-//! `sim-host map`: largest Lyapunov exponent, period, extent and regime over wheel speed and dither amplitude.
+//! `sim-host map`: largest Lyapunov exponent, period, extent and regime over wheel speed and dither
+//! amplitude.
 
 use super::grid::{GridOptions, TimeOptions};
 use super::options::ConfigOptions;
@@ -19,11 +20,13 @@ use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::dither::Waveform;
 use std::path::PathBuf;
 
-/// Compute a map over wheel speed N and dither amplitude W: largest Lyapunov exponent, period, extent and regime of each cell.
+/// Compute a map over wheel speed N and dither amplitude W: largest Lyapunov exponent, period,
+/// extent and regime of each cell.
 ///
-/// The dither is averaged and on from the start. Period and extent are computed from the turning points after the transient, the
-/// exponent from a tangent vector along the trajectory. Cells are computed in tiles, and each completed tile is stored in the work
-/// folder. On Ctrl-C, tiles in progress are finished, and the same command continues with the missing tiles. The files are
+/// The dither is averaged and on from the start. Period and extent are computed from the turning
+/// points after the transient, the exponent from a tangent vector along the trajectory. Cells are
+/// computed in tiles, and each completed tile is stored in the work folder. On Ctrl-C, tiles in
+/// progress are finished, and the same command continues with the missing tiles. The files are
 /// byte-identical for any number of threads, interruptions and shards.
 #[derive(Args)]
 #[command(
@@ -75,7 +78,8 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     sine_from: f64,
-    /// Number of amplitudes of each waveform including both ends, instead of --square-step and --sine-step
+    /// Number of amplitudes of each waveform including both ends, instead of --square-step and
+    /// --sine-step
     #[arg(long, value_name = "COUNT", default_value_t = 256, conflicts_with_all = ["square_step", "sine_step"])]
     amplitudes: usize,
     #[command(flatten)]

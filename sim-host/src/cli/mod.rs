@@ -44,10 +44,11 @@ use std::time::Duration;
 /// Time limit for an interrupted job to write its results.
 const GRACE: Duration = Duration::from_millis(900);
 
-/// Simulate the steering ECU on the host, compare it with the firmware in QEMU, and analyse chaos and its suppression by dither.
+/// Simulate the steering ECU on the host, compare it with the firmware in QEMU, and analyse chaos
+/// and its suppression by dither.
 ///
-/// Exit codes: 0 verdict pass, 1 verdict fail, 2 could not run (missing tool, invalid input, time-out). The last line gives the
-/// reason.
+/// Exit codes: 0 verdict pass, 1 verdict fail, 2 could not run (missing tool, invalid input,
+/// time-out). The last line gives the reason.
 #[derive(Parser)]
 #[command(name = "sim-host", version, max_term_width = 110)]
 struct Cli {
@@ -108,8 +109,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// On Ctrl-C or SIGTERM, long jobs finish their work in progress and write the results so far. A second signal ends them
-/// immediately, as does the end of the grace period.
+/// On Ctrl-C or SIGTERM, long jobs finish their work in progress and write the results so far. A
+/// second signal ends them immediately, as does the end of the grace period.
 fn end_soon() {
     if interrupt::request() {
         std::process::exit(COULD_NOT_RUN.into());

@@ -10,8 +10,8 @@ use dynamics::config::validate;
 use serde::Serialize;
 use shared_model::dither::Waveform;
 
-/// Compare effective and original nonlinearities (Figures 9 to 11 and 14 to 16): front tyre, rear tyre, and the sign function of the
-/// friction as printed.
+/// Compare effective and original nonlinearities (Figures 9 to 11 and 14 to 16): front tyre, rear
+/// tyre, and the sign function of the friction as printed.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host nonlinearity --dither square --amplitude-v 0.1 --figure figs9-11.svg

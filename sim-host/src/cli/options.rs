@@ -14,10 +14,12 @@ use std::time::Duration;
 /// Source of a scenario's parameters.
 #[derive(Args)]
 pub struct ConfigOptions {
-    /// Preset: `reconstruction` (the reading that reproduces the paper) or `printed` (the equations as printed)
+    /// Preset: `reconstruction` (the reading that reproduces the paper) or `printed` (the
+    /// equations as printed)
     #[arg(long, value_name = "NAME")]
     pub preset: Option<String>,
-    /// TOML file with parameters that replace the preset's; `sim-host config` prints a complete file
+    /// TOML file with parameters that replace the preset's; `sim-host config` prints a complete
+    /// file
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
 }
@@ -45,7 +47,8 @@ impl ConfigOptions {
     }
 }
 
-/// The scenario of a file. Reports the parameters that differ from the paper's, and a file without parameters.
+/// The scenario of a file. Reports the parameters that differ from the paper's, and a file without
+/// parameters.
 pub fn load_file(file: &Path, preset: Option<&str>) -> Result<Scenario<f64>, ConfigError> {
     let over = read(file)?;
     if sets_nothing(&over) {

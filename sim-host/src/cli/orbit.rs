@@ -15,11 +15,12 @@ use dynamics::words::counted;
 use serde::Serialize;
 use shared_model::Scenario;
 
-/// Compute an orbit diagram (bifurcation diagram) over wheel speed or dither amplitude: maxima of the yaw rate, or crossings of a
-/// section.
+/// Compute an orbit diagram (bifurcation diagram) over wheel speed or dither amplitude: maxima of
+/// the yaw rate, or crossings of a section.
 ///
-/// Each run starts from the scenario's initial state, or from the final state of its neighbour (`--start up` or `down`), which
-/// shows hysteresis. The dither is averaged and on from the start. Runs that diverge are reported as diverging and have no values.
+/// Each run starts from the scenario's initial state, or from the final state of its neighbour
+/// (`--start up` or `down`), which shows hysteresis. The dither is averaged and on from the start.
+/// Runs that diverge are reported as diverging and have no values.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host orbit --from 1600 --to 1900 --step 1 \\
@@ -40,8 +41,8 @@ pub struct Arguments {
     /// Initial state of each run
     #[arg(long, value_enum, default_value_t = StartOption::Fixed)]
     start: StartOption,
-    /// Section: the maxima of the yaw rate, or rising crossings of `--level` by a component. A crossing shows the yaw rate, a
-    /// crossing of the yaw rate shows the sideslip angle
+    /// Section: the maxima of the yaw rate, or rising crossings of `--level` by a component. A
+    /// crossing shows the yaw rate, a crossing of the yaw rate shows the sideslip angle
     #[arg(long, value_enum, default_value_t = SectionOption::YawRateMaxima)]
     section: SectionOption,
     /// Level of the section, rad or rad/s

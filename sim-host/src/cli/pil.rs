@@ -23,11 +23,11 @@ use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use std::path::{Path, PathBuf};
 
-/// Run manoeuvres with the ECU in the loop as a model (MIL), as software on this host (SIL) and as firmware in QEMU (PIL), and compare
-/// the three in each PWM period.
+/// Run manoeuvres with the ECU in the loop as a model (MIL), as software on this host (SIL) and as
+/// firmware in QEMU (PIL), and compare the three in each PWM period.
 ///
-/// The vehicle is simulated on the host in f64. Once per PWM period the ECU sends its duty and the vehicle answers. Repeated runs are
-/// byte-identical.
+/// The vehicle is simulated on the host in f64. Once per PWM period the ECU sends its duty and the
+/// vehicle answers. Repeated runs are byte-identical.
 #[derive(clap::Args)]
 #[command(
     mut_arg("out", |arg| arg.help("Write the vehicle's trajectory as CSV, one row per control tick")),
@@ -43,7 +43,8 @@ use std::path::{Path, PathBuf};
   sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
   sim-host pil --link uart --time 1     # the board's UART: realistic, slow")]
 pub struct Arguments {
-    /// Manoeuvres, as TOML files [default: constant speed of 1750 rpm, square dither from 3 s, 20 s]
+    /// Manoeuvres, as TOML files [default: constant speed of 1750 rpm, square dither from 3 s, 20
+    /// s]
     #[arg(long, value_name = "FILE", num_args = 1..)]
     scenario: Vec<PathBuf>,
     /// Constant wheel speed instead of the manoeuvre's, rpm
@@ -116,8 +117,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     })
 }
 
-/// Host and emulator alternate. On one core this costs a context switch; on two it costs a wake-up, which can take several times
-/// as long.
+/// Host and emulator alternate. On one core this costs a context switch; on two it costs a wake-up,
+/// which can take several times as long.
 fn keep_to_one_core() {
     use rustix::thread::{CpuSet, sched_getcpu, sched_setaffinity};
     let mut core = CpuSet::new();

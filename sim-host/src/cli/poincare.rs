@@ -12,7 +12,8 @@ use dynamics::words::counted;
 use plot::chart::{Chart, Look, Panel};
 use serde::Serialize;
 
-/// Compute a Poincaré section after the transient: the states at which one component crosses a value.
+/// Compute a Poincaré section after the transient: the states at which one component crosses a
+/// value.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host poincare --rpm 1750 --time 2000 --figure poincare.svg

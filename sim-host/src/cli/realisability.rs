@@ -10,8 +10,8 @@ use dynamics::words::Short;
 use serde::Serialize;
 use shared_model::dither::Waveform;
 
-/// Compute the frequency response of the steering actuator (Bode diagram), the torque for the dither's amplitude, and the amplitude
-/// at the motor's greatest torque, from 1 to 20,000 rad/s.
+/// Compute the frequency response of the steering actuator (Bode diagram), the torque for the
+/// dither's amplitude, and the amplitude at the motor's greatest torque, from 1 to 20,000 rad/s.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host realisability --figure bode.svg

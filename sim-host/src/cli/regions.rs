@@ -14,12 +14,14 @@ use dynamics::words::{Short, counted};
 use serde::Serialize;
 use shared_model::Scenario;
 
-/// Classify regimes (equilibrium, period-n, chaos) over wheel speed or dither amplitude, and bisect the edges between them.
+/// Classify regimes (equilibrium, period-n, chaos) over wheel speed or dither amplitude, and bisect
+/// the edges between them.
 ///
-/// The period is that of the yaw rate's maxima. Chaos requires a largest Lyapunov exponent that exceeds three standard errors and
-/// the resolution of the run. If the two criteria disagree, the regime is undecided. Chaos whose maxima visit n separate bands in
-/// turn is distinguished from one-band chaos. The sweep is run from the scenario's initial state and from the mirrored one, on the
-/// other lobe of the steering angle. Coexisting attractors are reported.
+/// The period is that of the yaw rate's maxima. Chaos requires a largest Lyapunov exponent that
+/// exceeds three standard errors and the resolution of the run. If the two criteria disagree, the
+/// regime is undecided. Chaos whose maxima visit n separate bands in turn is distinguished from
+/// one-band chaos. The sweep is run from the scenario's initial state and from the mirrored one, on
+/// the other lobe of the steering angle. Coexisting attractors are reported.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host regions --from 1600 --to 1900 --step 5 \\

@@ -9,10 +9,12 @@ use sim_host::reproduce::{CLAIMS, Judgement, Options, Progress, Quality, Summary
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// Reproduce the paper: draw its figures, check its claims under both presets, list its errata, and write one page.
+/// Reproduce the paper: draw its figures, check its claims under both presets, list its errata, and
+/// write one page.
 ///
-/// Completed parts are stored. After Ctrl-C, the same command continues with the missing parts. With the file of another vehicle,
-/// the claims are checked for that vehicle instead of the presets.
+/// Completed parts are stored. After Ctrl-C, the same command continues with the missing parts.
+/// With the file of another vehicle, the claims are checked for that vehicle instead of the
+/// presets.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host reproduce --quick    # everything in seconds

@@ -21,13 +21,16 @@ use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use std::path::{Path, PathBuf};
 
-/// Compute the dither amplitude W required at each wheel speed N, for square and sine wave: the ECU's table.
+/// Compute the dither amplitude W required at each wheel speed N, for square and sine wave: the
+/// ECU's table.
 ///
-/// At each speed the amplitude is scanned upwards from 0, from the scenario's initial state and from the mirrored one. If both
-/// trajectories without dither are at rest or of period one, the entry is 0. Otherwise it is the least amplitude of the first range
-/// with period one (one trajectory may be at rest) at that speed and no other regime at its neighbours, plus a margin. The map uses
-/// the averaged dither. The entries are then checked with the true signal at the PWM rate, at the table's speeds and midway. The run
-/// takes about ten seconds on 2 cores. The exit code is 1 if a speed has no such amplitude or a check fails.
+/// At each speed the amplitude is scanned upwards from 0, from the scenario's initial state and
+/// from the mirrored one. If both trajectories without dither are at rest or of period one, the
+/// entry is 0. Otherwise it is the least amplitude of the first range with period one (one
+/// trajectory may be at rest) at that speed and no other regime at its neighbours, plus a margin.
+/// The map uses the averaged dither. The entries are then checked with the true signal at the PWM
+/// rate, at the table's speeds and midway. The run takes about ten seconds on 2 cores. The exit
+/// code is 1 if a speed has no such amplitude or a check fails.
 #[derive(clap::Args)]
 // Finer and longer than the default map.
 #[command(
@@ -53,11 +56,12 @@ pub struct Arguments {
     config: ConfigOptions,
     #[command(flatten)]
     grid: GridOptions,
-    /// Number of steps from 0 to the greatest amplitude, instead of --square-step and --sine-step; edges are bisected to a sixteenth
-    /// of a step
+    /// Number of steps from 0 to the greatest amplitude, instead of --square-step and --sine-step;
+    /// edges are bisected to a sixteenth of a step
     #[arg(long, value_name = "COUNT", default_value_t = 30, conflicts_with_all = ["square_step", "sine_step"], value_parser = clap::value_parser!(u32).range(2..=1000))]
     amplitudes: u32,
-    /// Margin above the least amplitude, as a share of its range, from 0 to 1; at least half a PWM count
+    /// Margin above the least amplitude, as a share of its range, from 0 to 1; at least half a PWM
+    /// count
     #[arg(
         long,
         value_name = "SHARE",
@@ -67,8 +71,8 @@ pub struct Arguments {
     margin: f64,
     #[command(flatten)]
     times: TimeOptions,
-    /// Read the cells of the grid from a map's Parquet file instead of computing them; scenario, times and grid must be the same, with
-    /// both initial states
+    /// Read the cells of the grid from a map's Parquet file instead of computing them; scenario,
+    /// times and grid must be the same, with both initial states
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
     /// Write the table as Rust source, the module `shared_model::schedule_table`

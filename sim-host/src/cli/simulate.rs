@@ -54,7 +54,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// Writes a trajectory as CSV, one row per model step; the duty code is that of the step's last PWM period.
+/// Writes a trajectory as CSV, one row per model step; the duty code is that of the step's last PWM
+/// period.
 pub fn write(trace: &Trace, path: &std::path::Path, force: bool) -> anyhow::Result<()> {
     Ok(output::write(path, force, |to| {
         let mut csv = csv::Writer::from_writer(to);

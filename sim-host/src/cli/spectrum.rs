@@ -15,7 +15,8 @@ use std::f64::consts::TAU;
 /// Default number of segments, with half overlap.
 const SEGMENTS: f64 = 8.0;
 
-/// Estimate a power spectrum after the transient by Welch's method (Hann window, half overlap, one-sided density).
+/// Estimate a power spectrum after the transient by Welch's method (Hann window, half overlap,
+/// one-sided density).
 ///
 /// The dither, if any, is applied as the true signal, so that the spectrum has its line.
 #[derive(clap::Args)]
@@ -33,7 +34,8 @@ pub struct Arguments {
     /// Component of the state
     #[arg(long, value_name = "COMPONENT", default_value = "yaw_rate")]
     component: Component,
-    /// Length of a segment, s; lines closer than 2/SECONDS Hz merge [default: two ninths of the run, which gives eight segments]
+    /// Length of a segment, s; lines closer than 2/SECONDS Hz merge [default: two ninths of the
+    /// run, which gives eight segments]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     segment: Option<f64>,
     #[command(flatten)]

@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static DATA_IS_THERE: AtomicBool = AtomicBool::new(false);
 static FAILURE: OnceLock<io::Error> = OnceLock::new();
 
-/// Prints a line as `println!` does. A failure is stored for [`finish`], and nothing is printed after it.
+/// Prints a line as `println!` does. A failure is stored for [`finish`], and nothing is printed
+/// after it.
 macro_rules! say {
     ($($line:tt)*) => {
         $crate::cli::stdout::print(format_args!($($line)*))

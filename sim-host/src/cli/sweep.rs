@@ -1,4 +1,5 @@
-//! Options and progress of the subcommands with many runs: range, times, estimated cost and interruption.
+//! Options and progress of the subcommands with many runs: range, times, estimated cost and
+//! interruption.
 
 use super::options::RunOptions;
 use anyhow::{bail, ensure};
@@ -39,7 +40,8 @@ pub struct RangeOptions {
     /// First value, at which the steps begin, rpm or V [default: 1550 rpm; 0 V]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     from: Option<f64>,
-    /// Last value, which may be the lower one, rpm or V [default: 1900 rpm; 0.14 V of square wave, 1.4 V of sine]
+    /// Last value, which may be the lower one, rpm or V [default: 1900 rpm; 0.14 V of square wave,
+    /// 1.4 V of sine]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true)]
     to: Option<f64>,
     /// Step, rpm or V [default: 5 rpm; 0.002 V of square wave, 0.02 V of sine]
@@ -72,7 +74,8 @@ impl RangeOptions {
     }
 }
 
-/// A range of wheel speeds instead of one. Results are in ascending order for both orders of the ends.
+/// A range of wheel speeds instead of one. Results are in ascending order for both orders of the
+/// ends.
 #[derive(Args)]
 pub struct SpeedRange {
     /// First wheel speed of a range, at which the steps begin, rpm
@@ -135,7 +138,8 @@ impl TransientOptions {
         Timing::new(self.transient, time_s)
     }
 
-    /// Prints the estimated cost of many runs, of which `at_once` run in parallel. Rejects too many runs unless confirmed.
+    /// Prints the estimated cost of many runs, of which `at_once` run in parallel. Rejects too many
+    /// runs unless confirmed.
     pub fn announce(
         &self,
         runs: usize,

@@ -9,8 +9,8 @@ use dynamics::config::validate;
 use dynamics::words::Short;
 use serde::Serialize;
 
-/// Compute the cornering force as a function of the slip angle (Figure 2): both roads of Table 1, front and rear, Magic Formula and
-/// cubic tyre; also the configured road, if it differs.
+/// Compute the cornering force as a function of the slip angle (Figure 2): both roads of Table 1,
+/// front and rear, Magic Formula and cubic tyre; also the configured road, if it differs.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host tires --figure fig2.svg

@@ -18,12 +18,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Run the ECU in QEMU and the same model on the host, and report whether their results are equivalent and whether the dither
-/// suppresses the chaos.
+/// Run the ECU in QEMU and the same model on the host, and report whether their results are
+/// equivalent and whether the dither suppresses the chaos.
 ///
-/// The runs are: 1750 rpm without dither, with a square wave of 0.1 V and with a sine wave of 1.0 V; 1600, 1845 and 1880 rpm without
-/// dither; both dithers as true signals; and one run on a second core. The outputs are index.html, verdict.json, junit.xml and
-/// figures.
+/// The runs are: 1750 rpm without dither, with a square wave of 0.1 V and with a sine wave of 1.0
+/// V; 1600, 1845 and 1880 rpm without dither; both dithers as true signals; and one run on a second
+/// core. The outputs are index.html, verdict.json, junit.xml and figures.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host verify           # the paper's vehicle; report in target/report
@@ -40,7 +40,8 @@ pub struct Arguments {
         default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
     )]
     firmware: PathBuf,
-    /// The same image compiled with stack sizes, for the worst stack; `cargo xtask proofs` builds it
+    /// The same image compiled with stack sizes, for the worst stack; `cargo xtask proofs` builds
+    /// it
     #[arg(
         long,
         value_name = "ELF",

@@ -18,11 +18,13 @@ pub struct RunReport {
     pub dither_start_s: Option<f64>,
     /// Volts of a duty code: (code - period/2) times this.
     pub volts_per_count: f64,
-    /// Time (s) and defect of each step over its bound (at most 1 passes): host f64 step from the firmware's state.
+    /// Time (s) and defect of each step over its bound (at most 1 passes): host f64 step from the
+    /// firmware's state.
     pub one_step_defect: Vec<(f64, f64)>,
     /// Time (s) and distance of free f32 and f64 runs, relative to the attractor's size.
     pub divergence: Vec<(f64, f64)>,
-    /// Predicted time of their separation, s: least, expected, greatest; none where they must stay together.
+    /// Predicted time of their separation, s: least, expected, greatest; none where they must stay
+    /// together.
     pub horizon_s: Option<[f64; 3]>,
     /// Distance that counts as separation, or that must not be reached.
     pub divergence_limit: f64,

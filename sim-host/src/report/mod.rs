@@ -20,8 +20,9 @@ pub const FILES: [&str; 3] = ["verdict.json", "junit.xml", "index.html"];
 /// The folder of its figures.
 pub const FIGURES: &str = "figures";
 
-/// Writes `index.html`, `verdict.json`, `junit.xml` and `figures/*.svg` into the directory, which is
-/// made if it is missing. Files of these names are replaced, each at once; `index.html` comes last.
+/// Writes `index.html`, `verdict.json`, `junit.xml` and `figures/*.svg` into the directory, which
+/// is made if it is missing. Files of these names are replaced, each at once; `index.html` comes
+/// last.
 pub fn write(directory: &Path, input: &ReportInput) -> anyhow::Result<()> {
     for pair in input.pairs {
         ensure!(

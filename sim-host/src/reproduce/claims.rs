@@ -7,7 +7,8 @@ use dynamics::regions::{Regions, Sample};
 
 /// A region's edge counts as the paper's within 1 % of it.
 const EDGE_SHARE: f64 = 0.01;
-/// Share of a claimed range in which the claimed kind must be found; periodic windows in chaos are no contradiction.
+/// Share of a claimed range in which the claimed kind must be found; periodic windows in chaos are
+/// no contradiction.
 const MOST: f64 = 0.8;
 const SOME: f64 = 0.4;
 
@@ -205,8 +206,9 @@ fn composition(sweep: &Regions, from: f64, to: f64) -> String {
     words.collect::<Vec<_>>().join(", ")
 }
 
-/// Middle and half width of the edge between chaos in one band and anything else that is nearest to `claimed`. Chaos in three
-/// narrow bands looks much like period-3 in a diagram, so the paper's edges are where the bands have merged.
+/// Middle and half width of the edge between chaos in one band and anything else that is nearest to
+/// `claimed`. Chaos in three narrow bands looks much like period-3 in a diagram, so the paper's
+/// edges are where the bands have merged.
 fn nearest_edge_of_chaos(sweep: &Regions, claimed: f64) -> Option<(f64, f64)> {
     let begins = chaos_begins_at(claimed);
     let of_chaos = sweep.edges.iter().filter(|edge| edge.is_of_chaos(begins));

@@ -287,7 +287,8 @@ fn dithered_friction(experiment: &Experiment) -> Result<String, SweepError> {
     ))
 }
 
-/// The frictionless motion with the first line of (14) as printed: beta' = (F_f + F_r)/(m v) times gamma, not minus gamma.
+/// The frictionless motion with the first line of (14) as printed: beta' = (F_f + F_r)/(m v) times
+/// gamma, not minus gamma.
 fn printed_lateral(scenario: &Scenario<f64>) -> Result<String, SweepError> {
     scenario.validate()?;
     let model = Model::new(scenario);

@@ -27,7 +27,8 @@ const SHOWN_EVERY: usize = 5;
 const CONTROLLED: [(Waveform, f64, &str); 2] =
     [(Waveform::Square, 0.1, "12"), (Waveform::Sine, 1.0, "17")];
 
-/// Figures 12 and 17: time response of the slip angle with the dither from 3 s on, and phase portrait.
+/// Figures 12 and 17: time response of the slip angle with the dither from 3 s on, and phase
+/// portrait.
 pub fn suppression(named: &Named, _quality: Quality, watch: RunControl) -> Made {
     let mut base = named.scenario;
     base.run.wheel_speed_rpm = DITHERED_RPM;

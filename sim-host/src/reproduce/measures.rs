@@ -1,5 +1,5 @@
-//! Measures that the paper only mentions: all Lyapunov exponents, the Poincaré section and the frequency spectrum; and its own method for
-//! the largest exponent beside two others.
+//! Measures that the paper only mentions: all Lyapunov exponents, the Poincaré section and the
+//! frequency spectrum; and its own method for the largest exponent beside two others.
 
 use super::job::Quality;
 use super::material::{Drawing, Made, Material, Named, Table, csv_of};

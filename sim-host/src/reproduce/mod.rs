@@ -1,5 +1,5 @@
-//! Reproduction of the paper: its figures, its claims, its errata and further measurements. Complete pieces are kept and not
-//! computed again.
+//! Reproduction of the paper: its figures, its claims, its errata and further measurements.
+//! Complete pieces are kept and not computed again.
 
 mod characteristics;
 mod claims;

@@ -29,7 +29,8 @@ struct Part {
     name: &'static str,
     title: &'static str,
     claims: &'static [&'static str],
-    /// Its share of the time, measured in seconds on two cores at full quality: with the engine, and with the fixed step.
+    /// Its share of the time, measured in seconds on two cores at full quality: with the engine,
+    /// and with the fixed step.
     weights: [f64; 2],
     make: fn(&Named, Quality, RunControl) -> Made,
 }

@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 pub struct Product {
     /// Identifies its inputs: with other inputs it is computed again.
     fingerprint: String,
-    /// CRC-32 of all other fields and of the figures' files: with another one it is computed again.
+    /// CRC-32 of all other fields and of the figures' files: with another one it is computed
+    /// again.
     #[serde(default)]
     crc32: String,
     /// Title.

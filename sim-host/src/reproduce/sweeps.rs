@@ -1,4 +1,5 @@
-//! Sweeps over the speed and over the dither's amplitude: the diagrams of Figures 6, 7, 8 and 13, and the claims on them.
+//! Sweeps over the speed and over the dither's amplitude: the diagrams of Figures 6, 7, 8 and 13,
+//! and the claims on them.
 
 use super::claims;
 use super::figures::name_of;

@@ -20,8 +20,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 
-/// Free f32 and f64 runs of a periodic motion never get this far apart, over the attractor's size: a hundredth of what counts
-/// as parted.
+/// Free f32 and f64 runs of a periodic motion never get this far apart, over the attractor's size:
+/// a hundredth of what counts as parted.
 pub(super) const NEVER_PART: f64 = 1e-3;
 
 /// Transient of the paper's start before a run begins, s.

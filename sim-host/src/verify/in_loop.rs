@@ -1,4 +1,5 @@
-//! The ECU in the loop: does the firmware command what its program commands on the host, with a vehicle that answers?
+//! The ECU in the loop: does the firmware command what its program commands on the host, with a
+//! vehicle that answers?
 
 use super::checks::load;
 use super::job::{Options, Progress, VerifyError};

@@ -14,7 +14,8 @@ pub struct Options {
     pub image: Image,
     /// The same compiled with the functions' frames, for the worst stack; or why there is none.
     pub framed_image: Result<Image, String>,
-    /// Vehicle, road, friction, servo and rates of all runs; their speeds and dithers are the job's own.
+    /// Vehicle, road, friction, servo and rates of all runs; their speeds and dithers are the
+    /// job's own.
     pub base: Scenario<f64>,
     /// Length of each main run on the target, s.
     pub duration_s: f64,

@@ -32,8 +32,8 @@ pub struct Verification {
 /// Runs all cases, as many at a time as there are threads, and checks them.
 ///
 /// # Errors
-/// If a run cannot be made or its telemetry cannot be used. A firmware that differs from the host is no error but a
-/// failed check.
+/// If a run cannot be made or its telemetry cannot be used. A firmware that differs from the host
+/// is no error but a failed check.
 pub fn verify(
     options: &Options,
     on_progress: impl Fn(Progress) + Sync,
@@ -44,7 +44,8 @@ pub fn verify(
     }
     let outcomes: Vec<Outcome> = cases
         .into_par_iter()
-        // One at a time from the list's start, so that the long runs do not end up behind each other.
+        // One at a time from the list's start, so that the long runs do not end up behind each
+        // other.
         .with_max_len(1)
         .map(|case| {
             let outcome = case::run(case, options, &on_progress)?;

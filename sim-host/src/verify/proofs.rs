@@ -5,7 +5,8 @@ use super::job::Options;
 use image::stack::Stack;
 use plot::verdict::Check;
 
-/// Checks of the stack's bound against the RAM that there is for it, and of the depths that were measured against the bound.
+/// Checks of the stack's bound against the RAM that there is for it, and of the depths that were
+/// measured against the bound.
 pub(super) fn stack(options: &Options, outcomes: &[Outcome]) -> Vec<Check> {
     let title = "Worst stack by call graph and frames, against the RAM beside static variables";
     let stack = match analyse(options) {

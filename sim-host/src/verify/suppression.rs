@@ -1,4 +1,5 @@
-//! Suppression of chaos: the motion before and after dither, and the averaged system against the true signal.
+//! Suppression of chaos: the motion before and after dither, and the averaged system against the
+//! true signal.
 
 use super::case::{Outcome, Role};
 use super::checks::chaotic;
@@ -12,7 +13,8 @@ use std::f64::consts::TAU;
 
 const WAVEFORMS: [Waveform; 2] = [Waveform::Square, Waveform::Sine];
 
-/// Averaging errs by some multiple of the motion's frequency over the dither's; more than this multiple is no averaging.
+/// Averaging errs by some multiple of the motion's frequency over the dither's; more than this
+/// multiple is no averaging.
 const AVERAGING_ORDER: f64 = 10.0;
 
 /// The checks over several cases.
@@ -80,7 +82,8 @@ fn same_before_dither(before: &Outcome, after: &Outcome) -> Check {
     .detail(format!("{steps} states up to the dither's start"))
 }
 
-/// After the dither's start the motion is of period one and not chaotic: on the firmware and on the host.
+/// After the dither's start the motion is of period one and not chaotic: on the firmware and on the
+/// host.
 fn suppressed(after: &Outcome) -> Vec<Check> {
     let Some(analysis) = &after.analysis else {
         return Vec::new();

@@ -20,7 +20,8 @@ struct Llvm {
     cov: PathBuf,
 }
 
-/// Runs the model's tests with counters in every line, and names the lines that none of them reached.
+/// Runs the model's tests with counters in every line, and names the lines that none of them
+/// reached.
 pub fn run() -> Result<()> {
     let pinned = rustup::require_pinned()?;
     let llvm = Llvm::of(&pinned)?;

@@ -8,7 +8,8 @@ use crate::{firmware, rustup, setup};
 /// What stands for every board.
 const ALL: &str = "all";
 
-/// Builds the firmware's programs for `board`, or for all boards, and prints the path of each ECU's.
+/// Builds the firmware's programs for `board`, or for all boards, and prints the path of each
+/// ECU's.
 pub fn run(board: &str) -> Result<()> {
     let known = firmware::boards()?;
     let chosen: Vec<&str> = match known.iter().find(|known| *known == board) {

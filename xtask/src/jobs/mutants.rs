@@ -80,7 +80,8 @@ fn ensure(pinned: &str, tools: &Path) -> Result<()> {
 fn mutate(pinned: &str, tools: &Path, results: &Path) -> Result<()> {
     fs::create_dir_all(results)?;
     let program = program(tools);
-    // Through the toolchain's environment, so that the cargo which the tool starts is the pinned one.
+    // Through the toolchain's environment, so that the cargo which the tool starts is the pinned
+    // one.
     let mut command = rustup::tool(pinned, &program.to_string_lossy())?;
     command
         .current_dir(workspace::root())

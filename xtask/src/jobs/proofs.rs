@@ -43,7 +43,8 @@ pub fn run(overwrite_expected: bool) -> Result<()> {
     Ok(())
 }
 
-/// Every board's programs, the panic-free proof with them, and the ECU's once more with its functions' frames.
+/// Every board's programs, the panic-free proof with them, and the ECU's once more with its
+/// functions' frames.
 pub fn build(toolchain: &str) -> Result<()> {
     for board in firmware::boards()? {
         stage(&format!("firmware for {board}"), || {
@@ -66,7 +67,8 @@ fn prove_panic_free(toolchain: &str, board: &str) -> Result<()> {
     all.context(Exit::failed("`panic-free` did not build; a missing function in the linker's message means that a panic can be reached"))?;
     println!("   panic-free linked: no panic can be reached");
 
-    // A proof that cannot fail is none: with a panic put into the path, the link must miss the function.
+    // A proof that cannot fail is none: with a panic put into the path, the link must miss the
+    // function.
     let mut cargo = firmware::cargo(toolchain, "build", board)?;
     cargo.args(["--bin", "panic-free", "--features", "reachable-panic"]);
     let output = cargo.output().context("cargo does not start")?;

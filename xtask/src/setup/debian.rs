@@ -1,7 +1,8 @@
 //! The target built from Debian's Rust packages, for machines where rustup cannot download.
 //!
-//! Debian's compiler comes with the source of its libraries. Their part that the firmware needs is built once, into
-//! a folder that rustup links as one more toolchain. rustup's own toolchains do not change.
+//! Debian's compiler comes with the source of its libraries. Their part that the firmware needs is
+//! built once, into a folder that rustup links as one more toolchain. rustup's own toolchains do
+//! not change.
 
 use std::env;
 use std::fs::{self, Permissions};
@@ -29,7 +30,8 @@ pub fn plan() -> String {
     )
 }
 
-/// Installs the packages, builds the libraries and links the toolchain, each unless it is done already.
+/// Installs the packages, builds the libraries and links the toolchain, each unless it is done
+/// already.
 pub fn install(pinned: &str) -> Result<()> {
     install_packages(pinned)?;
     let folder = folder()?;
@@ -169,7 +171,8 @@ fn build_libraries(work: &Path) -> Result<PathBuf> {
         "-Zbuild-std=core,alloc",
     ]);
     cargo.arg("-Zbuild-std-features=compiler-builtins-mem");
-    // An own cargo home, so that the user's configuration does not apply; bitcode, so that the firmware can use LTO.
+    // An own cargo home, so that the user's configuration does not apply; bitcode, so that the
+    // firmware can use LTO.
     cargo
         .env("CARGO_HOME", work.join("cargo-home"))
         .env("CARGO_TARGET_DIR", work.join("target"));
@@ -189,7 +192,8 @@ fn build_libraries(work: &Path) -> Result<PathBuf> {
     Ok(work.join("target").join(TARGET).join("release/deps"))
 }
 
-/// Puts a toolchain together: the new libraries, Debian's own for build scripts and macros, rustup's linker.
+/// Puts a toolchain together: the new libraries, Debian's own for build scripts and macros,
+/// rustup's linker.
 fn assemble(pinned: &str, libraries: &Path, new: &Path, place: &Path) -> Result<()> {
     let version = compiler_version()?;
     let host = version

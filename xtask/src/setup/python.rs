@@ -1,5 +1,5 @@
-//! Python packages that the frames are checked against, in a virtual environment of their own: nothing is installed into
-//! the machine's Python.
+//! Python packages that the frames are checked against, in a virtual environment of their own:
+//! nothing is installed into the machine's Python.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,8 @@ const PROBE: &str = "import platform, cantools, e2e; print('Python', platform.py
 /// Where Debian splits Python, the package that brings `python3 -m venv`.
 const DEBIAN_PACKAGE: &str = "python3-venv";
 
-/// The virtual environment's Python, and its version; `None` unless all packages are installed as pinned.
+/// The virtual environment's Python, and its version; `None` unless all packages are installed as
+/// pinned.
 pub fn found() -> Result<Option<(PathBuf, String)>> {
     let python = program(&folder()?);
     let complete = fs::read_to_string(stamp()?).ok() == Some(fs::read_to_string(requirements())?);
@@ -28,7 +29,8 @@ pub fn found() -> Result<Option<(PathBuf, String)>> {
         .map(|version| (python, version)))
 }
 
-/// Makes the virtual environment unless it is there; again from nothing if the pinned packages changed.
+/// Makes the virtual environment unless it is there; again from nothing if the pinned packages
+/// changed.
 pub fn ensure() -> Result<()> {
     if found()?.is_some() {
         return Ok(());

@@ -1,4 +1,5 @@
-//! The compiler's target for the firmware: from rustup, or where rustup cannot download, from Debian's packages.
+//! The compiler's target for the firmware: from rustup, or where rustup cannot download, from
+//! Debian's packages.
 
 use std::time::Duration;
 
@@ -72,7 +73,8 @@ fn add_line(pinned: &str) -> String {
     format!("rustup target add --toolchain {pinned} {TARGET}")
 }
 
-/// A toolchain whose folder is a link belongs to another name, or another owner: nothing is written into it.
+/// A toolchain whose folder is a link belongs to another name, or another owner: nothing is written
+/// into it.
 fn is_linked(pinned: &str) -> Result<bool> {
     Ok(rustup::folder(pinned)?.is_symlink())
 }
@@ -87,7 +89,8 @@ fn add_through_rustup(pinned: &str) -> Result<bool> {
         rustup::folder(pinned)?.display()
     );
     let mut command = rustup::rustup()?;
-    // A blocked download is expected on some machines; rustup's own stack trace would not explain it.
+    // A blocked download is expected on some machines; rustup's own stack trace would not explain
+    // it.
     command
         .args(["target", "add", "--toolchain", pinned, TARGET])
         .env_remove("RUST_BACKTRACE");

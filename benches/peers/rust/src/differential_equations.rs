@@ -1,5 +1,6 @@
-//! differential-equations: dop853 on arrays; with friction dopri5, whose dense output is better between steps: at a tolerance
-//! of 1e-12 on an oscillator it errs by 2e-10 there, dop853's (0.7.0) by 5e-8.
+//! differential-equations: dop853 on arrays; with friction dopri5, whose dense output is better
+//! between steps: at a tolerance of 1e-12 on an oscillator it errs by 2e-10 there, dop853's (0.7.0)
+//! by 5e-8.
 
 use crate::export::Coefficients;
 use crate::job::{self, Outcome};
@@ -30,8 +31,9 @@ impl ODE<f64, [f64; 4]> for LaneInMode<'_> {
 
 /// Changes the mode where the event function turns negative, and counts.
 ///
-/// The root is found here, on the crate's dense output: the crate's own terminal events (0.7.0) end at steering rates of up
-/// to 2e-4 rad/s instead of 0, by its own dense output, at a tolerance of 1e-12.
+/// The root is found here, on the crate's dense output: the crate's own terminal events (0.7.0) end
+/// at steering rates of up to 2e-4 rad/s instead of 0, by its own dense output, at a tolerance of
+/// 1e-12.
 struct ChangeMode<'a> {
     lane: &'a LaneInMode<'a>,
     count: u32,
@@ -64,8 +66,8 @@ impl Solout<f64, [f64; 4]> for ChangeMode<'_> {
     }
 }
 
-/// Root of a function between two points, positive at the first or zero where a mode begins, and negative at the second, by
-/// the Illinois method.
+/// Root of a function between two points, positive at the first or zero where a mode begins, and
+/// negative at the second, by the Illinois method.
 fn root(mut f: impl FnMut(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
     for _ in 0..30 {
         if low.1 > 0.0 {

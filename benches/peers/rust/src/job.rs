@@ -20,7 +20,8 @@ pub struct Outcome {
     pub mode_changes: Vec<u32>,
 }
 
-/// Runs every lane; each gives its last state, its exponent and its changes of mode, where it has them.
+/// Runs every lane; each gives its last state, its exponent and its changes of mode, where it has
+/// them.
 fn run(mut lane: impl FnMut(&Coefficients) -> ([f64; 4], Option<f64>, Option<u32>)) -> Outcome {
     let lanes = coefficients();
     let start = ProcessTime::now();
@@ -62,7 +63,8 @@ pub fn exponent(
     })
 }
 
-/// Job F: with friction. `integrate` takes the start over some seconds and counts the changes of mode.
+/// Job F: with friction. `integrate` takes the start over some seconds and counts the changes of
+/// mode.
 pub fn friction(
     until_s: f64,
     integrate: impl Fn(&Coefficients, [f64; 4], f64) -> ([f64; 4], u32),

@@ -1,7 +1,8 @@
 //! Peers from crates.io, and the shared model's coefficients for the others.
 //!
-//! `peers export` prints coefficients, reference values of the right-hand side, and this program's own values there.
-//! `peers PEER JOB TOLERANCE SECONDS` runs a job once and prints its outcome. Both print JSON.
+//! `peers export` prints coefficients, reference values of the right-hand side, and this program's
+//! own values there. `peers PEER JOB TOLERANCE SECONDS` runs a job once and prints its outcome.
+//! Both print JSON.
 
 mod differential_equations;
 mod diffsol;

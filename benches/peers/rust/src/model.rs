@@ -6,14 +6,17 @@ use crate::export::Coefficients;
 pub const START: [f64; 4] = [0.01, 0.01, 0.001, 0.0];
 /// Tangent vector at the start.
 pub const TANGENT_START: [f64; 4] = [0.005; 4];
-/// Length of the tangent vector after a renormalisation: the state's size, so that a step-size control heeds both.
+/// Length of the tangent vector after a renormalisation: the state's size, so that a step-size
+/// control heeds both.
 pub const TANGENT_NORM: f64 = 0.01;
-/// Time between two renormalisations of the tangent vector. In it the vector grows 9-fold in the median, at most 1.1e5-fold;
-/// the greatest growth comes in bursts and is 9e4-fold in half the time as well.
+/// Time between two renormalisations of the tangent vector. In it the vector grows 9-fold in the
+/// median, at most 1.1e5-fold; the greatest growth comes in bursts and is 9e4-fold in half the time
+/// as well.
 pub const RENORMALISATION_S: f64 = 10.0;
 
-/// First step after a change of friction's mode, where a peer looks for events by signs at the ends of steps: a mode that
-/// begins and ends within one step would be missed. The shortest in the first 10 s lasts 0.4 ms.
+/// First step after a change of friction's mode, where a peer looks for events by signs at the ends
+/// of steps: a mode that begins and ends within one step would be missed. The shortest in the first
+/// 10 s lasts 0.4 ms.
 pub const STEP_AFTER_EVENT_S: f64 = 1e-4;
 
 impl Coefficients {

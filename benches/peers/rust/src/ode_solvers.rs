@@ -18,8 +18,9 @@ pub fn run(job: &str, tolerance: f64, until_s: f64) -> Option<Outcome> {
     macro_rules! integrate {
         () => {
             |c, x, duration_s| {
-                // The defaults, but as many steps as it takes, every step put out but none between, and no test for
-                // stiffness: at its default, every 1000 steps, it gives up on some lanes at tolerances from 1e-9 up.
+                // The defaults, but as many steps as it takes, every step put out but none between,
+                // and no test for stiffness: at its default, every 1000 steps, it gives up
+                // on some lanes at tolerances from 1e-9 up.
                 let mut solver = Dop853::from_param(
                     Lane(c),
                     0.0,

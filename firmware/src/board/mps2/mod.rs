@@ -1,6 +1,7 @@
 //! Arm MPS2 with the AN386 (Cortex-M4F) or AN500 (Cortex-M7) image, as QEMU emulates them.
 //!
-//! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of RAM.
+//! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of
+//! RAM.
 
 use super::{Board, BoardError, systick};
 use core::convert::Infallible;
@@ -11,8 +12,9 @@ use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 /// Clock of the core, SysTick and the APB timers, Hz.
 const CLOCK_HZ: u32 = 25_000_000;
 
-/// The emulator runs with `-icount shift=5`: 32 ns per instruction, a little above the real board's one instruction per
-/// clock at best, and slow enough that the 25 MHz counters resolve single instructions.
+/// The emulator runs with `-icount shift=5`: 32 ns per instruction, a little above the real board's
+/// one instruction per clock at best, and slow enough that the 25 MHz counters resolve single
+/// instructions.
 const INSTRUCTION_RATE_HZ: u32 = 31_250_000;
 
 /// CMSDK APB timer 0: control, value and reload registers. Counts down.
@@ -112,8 +114,8 @@ impl Board for Mps2 {
         }
     }
 
-    /// No WFI: a halted core hands every wake-up from one of the emulator's threads to the other, which takes longer than
-    /// to run through a block of instructions that do nothing.
+    /// No WFI: a halted core hands every wake-up from one of the emulator's threads to the other,
+    /// which takes longer than to run through a block of instructions that do nothing.
     // Out of line: the block is too long to be jumped over by the shortest branches.
     #[inline(never)]
     fn idle() {

@@ -1,8 +1,9 @@
 //! Netduino Plus 2: STM32F405 (Cortex-M4F), on silicon and as QEMU emulates it.
 //!
-//! TIM3's first channel, on pin PA6, is the servo's PWM. TIM2 counts the cost of the tasks. USART1, on PB6 and PB7, links
-//! a host. All clocks are the 16 MHz of the internal oscillator, which the chip has after a reset: the emulator has no
-//! clock controller, so a program that waits for the crystal or the PLL waits for ever.
+//! TIM3's first channel, on pin PA6, is the servo's PWM. TIM2 counts the cost of the tasks. USART1,
+//! on PB6 and PB7, links a host. All clocks are the 16 MHz of the internal oscillator, which the
+//! chip has after a reset: the emulator has no clock controller, so a program that waits for the
+//! crystal or the PLL waits for ever.
 //!
 //! | | silicon | emulator |
 //! |---|---|---|
@@ -25,9 +26,9 @@ const CLOCK_HZ: u32 = 16_000_000;
 /// 1 Mbit/s.
 const UART_DIVIDER: u16 = (CLOCK_HZ / 1_000_000) as u16;
 
-/// Rates in the emulator. It runs with `-icount shift=3`, 8 ns per instruction, and its SysTick at 168 MHz gives the
-/// program's second 16/168 s. So an instruction takes 1.3 of the program's clocks, about what a Cortex-M4 takes at 16 MHz,
-/// where the flash has no wait states.
+/// Rates in the emulator. It runs with `-icount shift=3`, 8 ns per instruction, and its SysTick at
+/// 168 MHz gives the program's second 16/168 s. So an instruction takes 1.3 of the program's
+/// clocks, about what a Cortex-M4 takes at 16 MHz, where the flash has no wait states.
 mod emulated {
     use super::CLOCK_HZ;
 
@@ -69,8 +70,8 @@ impl Board for NetduinoPlus2 {
         let mut pwm = channel.with(pins.pa6);
         Self::neutralise_pwm();
         pwm.enable();
-        // Right after the restart of the period, so that the interrupt writes a duty early in a period and it is taken over
-        // at that period's end, never ambiguous between two.
+        // Right after the restart of the period, so that the interrupt writes a duty early in a
+        // period and it is taken over at that period's end, never ambiguous between two.
         systick::start(&mut core.SYST, period);
         Ok(pwm)
     }
@@ -111,7 +112,8 @@ impl Board for NetduinoPlus2 {
     }
 
     fn open_uart() {
-        // SAFETY: port B and USART1 are used by nothing else, and their clocks by nothing that runs at the same time.
+        // SAFETY: port B and USART1 are used by nothing else, and their clocks by nothing that runs
+        // at the same time.
         let (rcc, port, uart) =
             unsafe { (&*pac::RCC::ptr(), &*pac::GPIOB::ptr(), &*pac::USART1::ptr()) };
         rcc.ahb1enr().modify(|_, w| w.gpioben().enabled());

@@ -1,7 +1,9 @@
-//! Nucleo-G474RE: STM32G474 (Cortex-M4F). It builds and passes the proofs of the link; no emulator has this chip.
+//! Nucleo-G474RE: STM32G474 (Cortex-M4F). It builds and passes the proofs of the link; no emulator
+//! has this chip.
 //!
-//! TIM3's first channel, on pin PA6, is the servo's PWM. TIM2 counts the cost of the tasks. USART1, on PC4 and PC5, links
-//! a host. All clocks are the 16 MHz of the internal oscillator, which the chip has after a reset.
+//! TIM3's first channel, on pin PA6, is the servo's PWM. TIM2 counts the cost of the tasks. USART1,
+//! on PC4 and PC5, links a host. All clocks are the 16 MHz of the internal oscillator, which the
+//! chip has after a reset.
 
 use super::{Board, BoardError, systick};
 use stm32g4xx_hal::gpio::{AF2, PA6};
@@ -44,8 +46,8 @@ impl Board for NucleoG474re {
         let (_, mut pwm) = builder.period(period - 1).finalize();
         Self::neutralise_pwm();
         pwm.enable();
-        // Right after the restart of the period, so that the interrupt writes a duty early in a period and it is taken over
-        // at that period's end, never ambiguous between two.
+        // Right after the restart of the period, so that the interrupt writes a duty early in a
+        // period and it is taken over at that period's end, never ambiguous between two.
         systick::start(&mut core.SYST, period);
         Ok(pwm)
     }
@@ -88,7 +90,8 @@ impl Board for NucleoG474re {
     }
 
     fn open_uart() {
-        // SAFETY: port C and USART1 are used by nothing else, and their clocks by nothing that runs at the same time.
+        // SAFETY: port C and USART1 are used by nothing else, and their clocks by nothing that runs
+        // at the same time.
         let (rcc, port, uart) =
             unsafe { (&*pac::RCC::ptr(), &*pac::GPIOC::ptr(), &*pac::USART1::ptr()) };
         rcc.ahb2enr().modify(|_, w| w.gpiocen().set_bit());

@@ -10,7 +10,8 @@ use engine::{EarlyEnd, Reason};
 use shared_model::vehicle::{STEERING_ANGLE, State, YAW_RATE};
 use shared_model::{InvalidScenario, Scenario};
 
-/// Share of their joint extent that two motions' extents must have in common to be of the same attractor.
+/// Share of their joint extent that two motions' extents must have in common to be of the same
+/// attractor.
 const COMMON_PERIODIC: f64 = 0.97;
 /// The same for chaotic motions, whose extents are those of a finite time.
 const COMMON_CHAOTIC: f64 = 0.8;
@@ -31,7 +32,8 @@ pub enum Kind {
     Periodic(usize),
     /// The maxima do not repeat, and the exponent is positive.
     Chaos,
-    /// Chaos whose maxima visit this many separate bands in turn: a diagram shows narrow ones much as it shows a period.
+    /// Chaos whose maxima visit this many separate bands in turn: a diagram shows narrow ones much
+    /// as it shows a period.
     BandedChaos(usize),
     /// Maxima and exponent disagree, or the run is too short for one of them.
     Undecided,
@@ -72,8 +74,8 @@ impl std::fmt::Display for Kind {
 pub struct Attractor {
     /// Its kind.
     pub kind: Kind,
-    /// Greatest difference of maxima one cycle apart, over the yaw rate's range: the period's uncertainty. Of a motion
-    /// without a period, the least over the periods tried.
+    /// Greatest difference of maxima one cycle apart, over the yaw rate's range: the period's
+    /// uncertainty. Of a motion without a period, the least over the periods tried.
     pub residual: Option<f64>,
     /// Time of a cycle, s.
     pub cycle_s: Option<f64>,
@@ -167,9 +169,10 @@ impl Attractor {
         (self.lower[YAW_RATE], self.upper[YAW_RATE])
     }
 
-    /// The two are the same attractor: of the same kind, and at rest within 1e-4 of each other or in the stick band of the
-    /// same of the `equilibria`; in motion with extents in every component that have 97 % in common, 80 % without a period.
-    /// Trajectories that diverge are the same, and those that could not be followed for the same reason.
+    /// The two are the same attractor: of the same kind, and at rest within 1e-4 of each other or
+    /// in the stick band of the same of the `equilibria`; in motion with extents in every
+    /// component that have 97 % in common, 80 % without a period. Trajectories that diverge are
+    /// the same, and those that could not be followed for the same reason.
     pub(crate) fn is_same(&self, other: &Self, equilibria: &[Equilibrium]) -> bool {
         if self.kind != other.kind {
             return false;
@@ -192,12 +195,12 @@ impl Attractor {
     }
 }
 
-/// Follows the scenarios' motions through their transients and says what they end on. Results are in the scenarios' order;
-/// motions that were not begun have none.
+/// Follows the scenarios' motions through their transients and says what they end on. Results are
+/// in the scenarios' order; motions that were not begun have none.
 ///
-/// The period is that of the yaw rate's maxima over the time observed, to 0.2 % of its range. If `with_exponent`, the
-/// largest Lyapunov exponent has to agree, positive only where there is no period; else a motion without period stays
-/// undecided, and one with period is taken as such.
+/// The period is that of the yaw rate's maxima over the time observed, to 0.2 % of its range. If
+/// `with_exponent`, the largest Lyapunov exponent has to agree, positive only where there is no
+/// period; else a motion without period stays undecided, and one with period is taken as such.
 ///
 /// # Errors
 /// If a scenario is not valid.
@@ -266,7 +269,8 @@ pub(crate) fn kind(
     }
 }
 
-/// The greatest number of bands, up to six, that the maxima visit in turn without any two of them meeting.
+/// The greatest number of bands, up to six, that the maxima visit in turn without any two of them
+/// meeting.
 fn bands(maxima: &[(f64, f64)]) -> usize {
     let apart = |n: usize| {
         let band = |k: usize| {

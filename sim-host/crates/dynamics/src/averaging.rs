@@ -1,4 +1,5 @@
-//! The true dither signal against the averaged system, over the dither's frequency: where averaging starts to hold.
+//! The true dither signal against the averaged system, over the dither's frequency: where averaging
+//! starts to hold.
 
 use crate::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
 use crate::simulate::{settle, simulate, started_at};
@@ -16,7 +17,8 @@ const TRANSIENT_S: f64 = 200.0;
 const DITHER_TRANSIENT_S: f64 = 20.0;
 /// Length of the motion that is compared, s.
 const MOTION_S: f64 = 40.0;
-/// Model steps in a period of the dither, at least: the sampled sine's mean square is then that of the true one.
+/// Model steps in a period of the dither, at least: the sampled sine's mean square is then that of
+/// the true one.
 const STEPS_A_PERIOD: f64 = 32.0;
 /// Clock of a timer that any PWM rate of the sweep fits.
 const TIMER_CLOCK_HZ: f64 = 1e8;
@@ -30,7 +32,8 @@ pub struct Comparison {
     pub period: Option<usize>,
     /// The same in the averaged system.
     pub averaged_period: Option<usize>,
-    /// Cycle time, true signal from averaged, in percent of it; none unless both have the same period.
+    /// Cycle time, true signal from averaged, in percent of it; none unless both have the same
+    /// period.
     pub cycle_difference_percent: Option<f64>,
     /// Swing of the yaw rate (greatest less least), true signal from averaged, in percent of it.
     pub swing_difference_percent: Option<f64>,

@@ -20,17 +20,20 @@ pub struct Cell {
 /// Which start ends where.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Basin {
-    /// The attractors, in the order in which the starts meet them; motions that diverge count as one.
+    /// The attractors, in the order in which the starts meet them; motions that diverge count as
+    /// one.
     pub attractors: Vec<Attractor>,
     /// The starts, by steering angle within sideslip angle; those not begun are left out.
     pub cells: Vec<Cell>,
 }
 
-/// Follows the motion from each start of the grid; yaw rate and steering rate start as in the scenario.
+/// Follows the motion from each start of the grid; yaw rate and steering rate start as in the
+/// scenario.
 ///
-/// Trajectories are told apart by kind and extent ([`Attractor::is_same`]); the first on each attractor without period has its
-/// exponent worked out, which tells chaos from a transient that outlasts the run. Time grows with the number of starts
-/// times the length of a run; starts that diverge end early.
+/// Trajectories are told apart by kind and extent ([`Attractor::is_same`]); the first on each
+/// attractor without period has its exponent worked out, which tells chaos from a transient that
+/// outlasts the run. Time grows with the number of starts times the length of a run; starts that
+/// diverge end early.
 ///
 /// # Errors
 /// If a start's scenario is not valid.

@@ -1,5 +1,5 @@
-//! Curves that need no motion: cornering force of the tyres (Figure 2), and what dither makes of the nonlinearities
-//! (Figures 9 to 11 and 14 to 16).
+//! Curves that need no motion: cornering force of the tyres (Figure 2), and what dither makes of
+//! the nonlinearities (Figures 9 to 11 and 14 to 16).
 
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use plot::number::four_digits;
@@ -42,7 +42,8 @@ pub struct TireRow {
     pub cubic_n: f64,
 }
 
-/// The roads of Table 1, and that of the scenario if it is another: key, name for people, coefficients.
+/// The roads of Table 1, and that of the scenario if it is another: key, name for people,
+/// coefficients.
 fn roads(scenario: &Scenario<f64>) -> Vec<(&'static str, &'static str, Road)> {
     let configured = (scenario.tires.front, scenario.tires.rear);
     let mut roads = vec![
@@ -80,8 +81,8 @@ pub fn tires(scenario: &Scenario<f64>, greatest_slip_rad: f64) -> Vec<TireRow> {
     rows
 }
 
-/// The figure of [`tires`]: a panel for each road, its axis a little beyond the greatest force of the Magic Formula and
-/// the cubic tyre's local maximum.
+/// The figure of [`tires`]: a panel for each road, its axis a little beyond the greatest force of
+/// the Magic Formula and the cubic tyre's local maximum.
 pub fn tires_chart(scenario: &Scenario<f64>, rows: &[TireRow]) -> Chart {
     let greatest_slip = rows.last().map_or(1.0, |row| row.slip_angle_rad);
     let panels = roads(scenario)
@@ -118,7 +119,8 @@ pub fn tires_chart(scenario: &Scenario<f64>, rows: &[TireRow]) -> Chart {
     }
 }
 
-/// The cubic tyre's local maximum 2 k1/3 sqrt(k1/(3 k2)) if it has one up to the slip angle, N; else 0.
+/// The cubic tyre's local maximum 2 k1/3 sqrt(k1/(3 k2)) if it has one up to the slip angle, N;
+/// else 0.
 fn cubic_peak_n(tire: &MagicFormula<f64>, greatest_slip_rad: f64) -> f64 {
     let cubic = tire.cubic();
     let slip_rad = (cubic.linear_n_per_rad / (3.0 * cubic.cubic_n_per_rad3)).sqrt();
@@ -148,8 +150,9 @@ pub struct NonlinearityRow {
     pub friction_effective_nm: f64,
 }
 
-/// The scenario's tyres and the printed friction law (13), and their means under the scenario's dither, up to an argument:
-/// (21) for the square wave, Figures 9 to 11; (25) to (27) for the sine, Figures 14 to 16.
+/// The scenario's tyres and the printed friction law (13), and their means under the scenario's
+/// dither, up to an argument: (21) for the square wave, Figures 9 to 11; (25) to (27) for the sine,
+/// Figures 14 to 16.
 pub fn nonlinearities(scenario: &Scenario<f64>, greatest_rad: f64) -> Vec<NonlinearityRow> {
     let tire = |coefficients| Tire::new(scenario.tires.model, coefficients);
     let (front, rear) = (tire(&scenario.tires.front), tire(&scenario.tires.rear));
@@ -260,7 +263,8 @@ mod tests {
         assert_eq!(tires_chart(&other, &rows).panels.len(), 3);
     }
 
-    /// (21) and (27) by hand: the mean of the shifted functions, and the arcsine within the amplitude.
+    /// (21) and (27) by hand: the mean of the shifted functions, and the arcsine within the
+    /// amplitude.
     #[test]
     fn effective_nonlinearities_are_the_means_of_the_original_ones() {
         let scenario = dithered(Waveform::Square, 0.1);

@@ -75,7 +75,8 @@ pub fn preset(name: &str) -> Result<Preset, ConfigError> {
     Preset::from_name(name).ok_or_else(|| ConfigError::UnknownPreset { name: name.into() })
 }
 
-/// The scenario of a file's table over a preset: the one named, else that named in the file, else `reconstruction`.
+/// The scenario of a file's table over a preset: the one named, else that named in the file, else
+/// `reconstruction`.
 ///
 /// # Errors
 /// If it has a key that no parameter has, or a value of the wrong kind.
@@ -142,8 +143,8 @@ fn allowed(key: &str) -> Option<String> {
     }
 }
 
-/// The parameters in which a scenario differs from the paper's (the preset `reconstruction`), each as `key = value (paper's
-/// value)`.
+/// The parameters in which a scenario differs from the paper's (the preset `reconstruction`), each
+/// as `key = value (paper's value)`.
 pub fn differences(scenario: &Scenario<f64>) -> Vec<String> {
     let mut differences = Vec::new();
     let paper = table_of(&Scenario::reconstruction());
@@ -183,7 +184,8 @@ pub fn read(path: &Path) -> Result<Table, ConfigError> {
     })
 }
 
-/// Replaces values of `base` by those of `over`. The base is complete, so a key that it lacks is unknown.
+/// Replaces values of `base` by those of `over`. The base is complete, so a key that it lacks is
+/// unknown.
 fn merge(base: &mut Table, over: Table, prefix: &str) -> Result<(), ConfigError> {
     for (name, value) in over {
         let key = format!("{prefix}{name}");

@@ -9,7 +9,8 @@ use shared_model::Scenario;
 
 /// Tolerance of the reference: far below the least error of the fixed step.
 const REFERENCE_TOLERANCE: f64 = 1e-14;
-/// A PWM rate that is a multiple of all the steps' rates. The averaged motion does not depend on it.
+/// A PWM rate that is a multiple of all the steps' rates. The averaged motion does not depend on
+/// it.
 const PWM_RATE_HZ: f64 = 16_000.0;
 
 /// Error of the fixed step at one length.
@@ -25,7 +26,8 @@ pub struct Error {
 
 /// Errors after `time_s` of the scenario's motion with steps of 4 ms and six halvings of it.
 ///
-/// With friction events single orders scatter, because an event lies elsewhere in its step each time; the trend is second order.
+/// With friction events single orders scatter, because an event lies elsewhere in its step each
+/// time; the trend is second order.
 ///
 /// # Errors
 /// If the scenario is not valid at one of the steps, or the motion leaves all bounds.

@@ -1,4 +1,5 @@
-//! Equally spaced numbers as a reader counts them: 0, 0.1, 0.2, 0.3, each the double nearest to its decimal value.
+//! Equally spaced numbers as a reader counts them: 0, 0.1, 0.2, 0.3, each the double nearest to its
+//! decimal value.
 
 /// The numbers `(first + k * rise / per) * 10^exponent`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,8 +26,8 @@ pub enum NotSpaced {
 const DIGITS: usize = 40;
 
 impl Spaced {
-    /// The numbers from `from` in steps of `step`, not beyond `to` and at most `most`; ascending, also if `to` is the lower one.
-    /// All must be finite, the step not 0.
+    /// The numbers from `from` in steps of `step`, not beyond `to` and at most `most`; ascending,
+    /// also if `to` is the lower one. All must be finite, the step not 0.
     ///
     /// # Errors
     /// See [`NotSpaced`].
@@ -51,7 +52,8 @@ impl Spaced {
         .checked()
     }
 
-    /// `count` numbers, at least 1, with `from` and `to` as the first and the last; ascending. Of one number both are the same.
+    /// `count` numbers, at least 1, with `from` and `to` as the first and the last; ascending. Of
+    /// one number both are the same.
     ///
     /// # Errors
     /// See [`NotSpaced`].
@@ -110,7 +112,8 @@ impl Spaced {
     }
 }
 
-/// Numbers as multiples of the same power of ten, by the shortest digits that are read back as them: those that a reader types.
+/// Numbers as multiples of the same power of ten, by the shortest digits that are read back as
+/// them: those that a reader types.
 fn scaled<const N: usize>(numbers: [f64; N]) -> Result<([i128; N], i32), NotSpaced> {
     let parts = numbers.map(|number| {
         let text = format!("{number:e}");

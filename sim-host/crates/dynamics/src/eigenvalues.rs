@@ -24,11 +24,11 @@ impl std::fmt::Display for Eigenvalue {
     }
 }
 
-/// Eigenvalues of a matrix, the greatest real part first, of a pair the positive imaginary part first; not a number, each of
-/// them, if the matrix's numbers are not finite.
+/// Eigenvalues of a matrix, the greatest real part first, of a pair the positive imaginary part
+/// first; not a number, each of them, if the matrix's numbers are not finite.
 ///
-/// By the real Schur decomposition. Good to some 1e-10 of the largest for the distinct ones of well scaled matrices; near a
-/// double one to the square root of that.
+/// By the real Schur decomposition. Good to some 1e-10 of the largest for the distinct ones of well
+/// scaled matrices; near a double one to the square root of that.
 pub fn eigenvalues<const N: usize>(matrix: &SMatrix<f64, N, N>) -> Vec<Eigenvalue> {
     let matrix = DMatrix::from_column_slice(N, N, matrix.as_slice());
     let Some(schur) = Schur::try_new(matrix, f64::EPSILON, MOST_ITERATIONS) else {

@@ -1,10 +1,12 @@
 //! Equilibria at a speed, their eigenvalues, and the speeds of Hopf bifurcations.
 //!
-//! At an equilibrium sideslip, yaw rate and steering angle stay: beta' = gamma' = delta_f' = delta_f'' = 0 in (14), with the
-//! mean of the dither. Dry friction needs care. Coulomb friction on the rate holds the steering wherever the other torques
-//! are within its limit, so there is a continuum of equilibria: reported is the one at which no friction is needed, and the
-//! *stick band* around it, in which |r_s tau_M - tau_a| <= tau_c. The printed law is constant on either side of
-//! delta_f = 0; reported are the balances with that torque on the side on which it acts.
+//! At an equilibrium sideslip, yaw rate and steering angle stay: beta' = gamma' = delta_f' =
+//! delta_f'' = 0 in (14), with the mean of the dither. Dry friction needs care. Coulomb friction on
+//! the rate holds the steering wherever the other torques are within its limit, so there is a
+//! continuum of equilibria: reported is the one at which no friction is needed, and the
+//! *stick band* around it, in which |r_s tau_M - tau_a| <= tau_c. The printed law is constant on
+//! either side of delta_f = 0; reported are the balances with that torque on the side on which it
+//! acts.
 
 use crate::eigenvalues::{Eigenvalue, eigenvalues};
 use crate::sweep::{Parameter, RunControl, SweepError, Values, scenarios};
@@ -30,7 +32,8 @@ const SAME: f64 = 1e-7;
 const SAME_BRANCH_RAD: f64 = 1e-3;
 /// Steps in which a stick band is followed from its middle to each end.
 const BAND_STEPS: i32 = 64;
-/// A state of rest this far out of a stick band still belongs to it, rad and rad/s: what the flow still moves.
+/// A state of rest this far out of a stick band still belongs to it, rad and rad/s: what the flow
+/// still moves.
 const BAND_MARGIN: f64 = 1e-4;
 /// Width to which the speed of a Hopf bifurcation is located, rpm.
 const HOPF_WIDTH_RPM: f64 = 1e-3;
@@ -38,8 +41,8 @@ const HOPF_WIDTH_RPM: f64 = 1e-3;
 /// Where a sticking steering may rest.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct StickBand {
-    /// End at which friction holds the steering against a torque of -tau_c (state vector), or where the balance folds back
-    /// before.
+    /// End at which friction holds the steering against a torque of -tau_c (state vector), or
+    /// where the balance folds back before.
     pub lower: [f64; 4],
     /// The end with tau_c.
     pub upper: [f64; 4],
@@ -78,13 +81,15 @@ impl Equilibrium {
         })
     }
 
-    /// The equilibrium with these slip angles (rad) is this one at another speed: the motor's torque fixes the forces, so the slip angles stay.
+    /// The equilibrium with these slip angles (rad) is this one at another speed: the motor's
+    /// torque fixes the forces, so the slip angles stay.
     pub(crate) fn is_on_branch(&self, slip_angles_rad: &[f64; 2]) -> bool {
         let mut pairs = self.slip_angles_rad.iter().zip(slip_angles_rad);
         pairs.all(|(a, b)| (a - b).abs() < SAME_BRANCH_RAD)
     }
 
-    /// The pair of complex eigenvalues with the greatest real part, by the one with positive imaginary part.
+    /// The pair of complex eigenvalues with the greatest real part, by the one with positive
+    /// imaginary part.
     pub fn leading_pair(&self) -> Option<Eigenvalue> {
         self.eigenvalues_per_s.iter().copied().find(|e| e.im > 0.0)
     }
@@ -219,8 +224,9 @@ impl Balance {
 
 /// All equilibria of a scenario with slip angles below a right angle, by ascending steering angle.
 ///
-/// Newton's method with the Jacobian of dual numbers from a grid of slip angles of both axles, denser towards zero, each
-/// with the yaw rate that its forces balance; duplicates are merged. The residual of each is below 1e-10 (rad/s, rad/s^2).
+/// Newton's method with the Jacobian of dual numbers from a grid of slip angles of both axles,
+/// denser towards zero, each with the yaw rate that its forces balance; duplicates are merged. The
+/// residual of each is below 1e-10 (rad/s, rad/s^2).
 ///
 /// # Errors
 /// If the scenario is not valid.
@@ -302,9 +308,10 @@ pub fn over_speed(
 
 /// Hopf bifurcations between neighbouring speeds of [`over_speed`], by ascending speed.
 ///
-/// Each equilibrium is followed by Newton's method to the next speed; where the real part of its leading pair changes sign,
-/// bisection locates the root to 0.001 rpm. The eigenvalues are those of sliding motion. Coulomb friction with stick hides the
-/// bifurcation from small oscillations: they come to rest in the stick band on both sides of it.
+/// Each equilibrium is followed by Newton's method to the next speed; where the real part of its
+/// leading pair changes sign, bisection locates the root to 0.001 rpm. The eigenvalues are those of
+/// sliding motion. Coulomb friction with stick hides the bifurcation from small oscillations: they
+/// come to rest in the stick band on both sides of it.
 ///
 /// # Errors
 /// If a speed is not valid.
@@ -391,7 +398,8 @@ pub struct Speed {
     pub equilibria: Vec<Equilibrium>,
 }
 
-/// Eigenvalues in the complex plane at one speed, or branches over several, with their Hopf bifurcations.
+/// Eigenvalues in the complex plane at one speed, or branches over several, with their Hopf
+/// bifurcations.
 pub fn chart(speeds: &[Speed], hopf: &[Hopf]) -> Chart {
     match speeds {
         [speed] => eigenvalue_chart(speed),

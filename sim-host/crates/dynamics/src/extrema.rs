@@ -1,12 +1,14 @@
-//! Maxima of a sampled quantity found while the motion runs, so that long runs need no room for their states.
+//! Maxima of a sampled quantity found while the motion runs, so that long runs need no room for
+//! their states.
 
 use crate::period::{AT_REST_RAD_PER_S, maxima_of_turns};
 
 /// Collects the turning points of a quantity from its samples: two a cycle, whatever the step.
 ///
-/// A turning point counts at once if the quantity moves away from it by 1e-6; [`maxima`](Self::maxima) then keeps those
-/// that stand out by a hundredth of the range, which is known only at the end. The result is that of
-/// [`yaw_rate_maxima`](crate::period::yaw_rate_maxima) on the recorded motion.
+/// A turning point counts at once if the quantity moves away from it by 1e-6;
+/// [`maxima`](Self::maxima) then keeps those that stand out by a hundredth of the range, which is
+/// known only at the end. The result is that of [`yaw_rate_maxima`](crate::period::yaw_rate_maxima)
+/// on the recorded motion.
 #[derive(Debug, Clone, Default)]
 pub struct Extrema {
     /// Time (s) and height of each turning point; the first is a minimum, then they alternate.
@@ -29,7 +31,8 @@ struct Sample {
 }
 
 impl Sample {
-    /// Time and height of the parabola's vertex through the sample and its neighbours; its error is of third order.
+    /// Time and height of the parabola's vertex through the sample and its neighbours; its error is
+    /// of third order.
     fn vertex(&self) -> (f64, f64) {
         let Some(right) = self.right else {
             return (self.time_s, self.value);

@@ -1,5 +1,5 @@
-//! Trajectories that the engine cannot follow, because their friction is under the mean of a sine or they slide along a step of friction:
-//! the same findings at the ECU's fixed step.
+//! Trajectories that the engine cannot follow, because their friction is under the mean of a sine
+//! or they slide along a step of friction: the same findings at the ECU's fixed step.
 
 use crate::component::Component;
 use crate::extrema::Extrema;
@@ -12,9 +12,11 @@ use engine::taylor::{Crossing, Observables, Trajectory};
 use shared_model::vehicle::State;
 use shared_model::{InvalidScenario, Scenario};
 
-/// What [`observe`](crate::observe::observe) finds of a motion. Changes of friction mode are not counted.
+/// What [`observe`](crate::observe::observe) finds of a motion. Changes of friction mode are not
+/// counted.
 ///
-/// Extents are those of the states behind the steps, turning points and crossings interpolated between them.
+/// Extents are those of the states behind the steps, turning points and crossings interpolated
+/// between them.
 ///
 /// # Errors
 /// If the scenario is not valid.
@@ -70,7 +72,8 @@ pub fn observe<const K: usize>(
     Ok(found)
 }
 
-/// The stretching of the tangent vectors in the engine's segments: whole steps make a segment a little shorter than those.
+/// The stretching of the tangent vectors in the engine's segments: whole steps make a segment a
+/// little shorter than those.
 fn segments<const K: usize>(
     scenario: &Scenario<f64>,
     start: &State<f64>,

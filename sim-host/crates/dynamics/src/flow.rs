@@ -23,8 +23,8 @@ pub trait Flow<const N: usize> {
         x.iter().all(|value| value.is_finite())
     }
 
-    /// Why a motion from `start` is at a state that it may not have `time_s` later: it diverges, or the step is too long. Without a
-    /// second integrator there is no telling.
+    /// Why a motion from `start` is at a state that it may not have `time_s` later: it diverges, or
+    /// the step is too long. Without a second integrator there is no telling.
     fn why_unbounded(&self, _start: &SVector<f64, N>, _time_s: f64) -> Reason {
         Reason::Diverges
     }
@@ -33,7 +33,8 @@ pub trait Flow<const N: usize> {
 /// Why a motion has no exponent.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Unmeasured {
-    /// The motion, or its numerical solution, leaves all bounds. The time counts from the start given.
+    /// The motion, or its numerical solution, leaves all bounds. The time counts from the start
+    /// given.
     #[error(transparent)]
     EndsEarly(#[from] EarlyEnd),
     /// The motion is too short for a standard error.
@@ -68,7 +69,8 @@ pub fn settle<const N: usize>(
     Ok(x)
 }
 
-/// An error if the state that the motion from `start` has after `steps` steps is none of the system's.
+/// An error if the state that the motion from `start` has after `steps` steps is none of the
+/// system's.
 pub(crate) fn check<const N: usize>(
     flow: &impl Flow<N>,
     start: &SVector<f64, N>,
@@ -85,8 +87,8 @@ pub(crate) fn check<const N: usize>(
 
 /// The vehicle under its dither, averaged and on from the start, by the ECU's integrator.
 ///
-/// [`integrate::step`] derives the friction mode from the state vector, so the vector is the whole state: at a steering rate of
-/// exactly zero the torques decide whether the steering sticks.
+/// [`integrate::step`] derives the friction mode from the state vector, so the vector is the whole
+/// state: at a steering rate of exactly zero the torques decide whether the steering sticks.
 #[derive(Debug, Clone)]
 pub struct VehicleFlow {
     model: Model<f64>,
@@ -137,7 +139,8 @@ impl VehicleFlow {
 impl Flow<4> for VehicleFlow {
     fn step<T: Real>(&self, x: &Vector4<T>) -> Vector4<T> {
         interrupt::check();
-        // The constants are carried over each time: some forty moves beside thousands of operations.
+        // The constants are carried over each time: some forty moves beside thousands of
+        // operations.
         let model = self.model.map(&T::from_f64);
         let injection = self.injection.map(T::from_f64);
         let mut state = State {

@@ -1,10 +1,11 @@
 //! Lyapunov exponents by tangent dynamics.
 //!
-//! A tangent vector is carried along a motion by the linearised step (dual numbers through the integrator itself, so with
-//! the right jumps at friction events; stick takes one dimension away), and the mean rate of its growth is the largest
-//! exponent. [`largest`] takes any recorded motion: the firmware's own telemetry will do. [`exponents`] runs freely along a
-//! [`Flow`] with as many vectors as exponents are wanted, kept at right angles. The engine's motions have tangent vectors of
-//! their own; their stretching becomes exponents here too.
+//! A tangent vector is carried along a motion by the linearised step (dual numbers through the
+//! integrator itself, so with the right jumps at friction events; stick takes one dimension away),
+//! and the mean rate of its growth is the largest exponent. [`largest`] takes any recorded motion:
+//! the firmware's own telemetry will do. [`exponents`] runs freely along a [`Flow`] with as many
+//! vectors as exponents are wanted, kept at right angles. The engine's motions have tangent vectors
+//! of their own; their stretching becomes exponents here too.
 
 use crate::flow::{Flow, Unmeasured, check, steps};
 use crate::period::yaw_rate_maxima;
@@ -22,12 +23,14 @@ const MIN_SEGMENTS: usize = 16;
 const SEGMENTS_AT_REST: usize = 64;
 /// Segments of equal time that a free-running motion is cut into.
 pub(crate) const SEGMENTS: usize = 128;
-/// A tangent vector is lost when orthogonalisation leaves less than this share of it: rounding leaves 1e-16 of a vector that has
-/// no direction of its own, contraction within one step leaves far more.
+/// A tangent vector is lost when orthogonalisation leaves less than this share of it: rounding
+/// leaves 1e-16 of a vector that has no direction of its own, contraction within one step leaves
+/// far more.
 const LOST: f64 = 1e-12;
 /// Correlation of neighbours up to which a sequence is prewhitened.
 const GREATEST_CORRELATION: f64 = 0.97;
-/// Time in which the tangent vector turns into the direction of fastest growth, as a share of the motion.
+/// Time in which the tangent vector turns into the direction of fastest growth, as a share of the
+/// motion.
 pub(crate) const WARM_UP: f64 = 0.1;
 
 /// A Lyapunov exponent with its statistical error.
@@ -35,10 +38,12 @@ pub(crate) const WARM_UP: f64 = 0.1;
 pub struct Exponent {
     /// Mean growth rate, 1/s.
     pub per_s: f64,
-    /// Standard error, 1/s; it takes the correlation of successive segments of the motion into account.
+    /// Standard error, 1/s; it takes the correlation of successive segments of the motion into
+    /// account.
     pub standard_error_per_s: f64,
-    /// The least rate that the motion's length can tell from zero, 1/s: the most that the vector stretches beyond the mean
-    /// within one cycle, and at least one e-fold, over the whole length.
+    /// The least rate that the motion's length can tell from zero, 1/s: the most that the vector
+    /// stretches beyond the mean within one cycle, and at least one e-fold, over the whole
+    /// length.
     pub resolution_per_s: f64,
     /// Length of the motion that it is taken over, s.
     pub duration_s: f64,
@@ -62,7 +67,8 @@ impl Exponent {
         }
     }
 
-    /// What the exponent must exceed to count as positive: three standard errors, and the resolution.
+    /// What the exponent must exceed to count as positive: three standard errors, and the
+    /// resolution.
     pub fn threshold_per_s(&self) -> f64 {
         (3.0 * self.standard_error_per_s).max(self.resolution_per_s)
     }
@@ -73,11 +79,11 @@ impl Exponent {
     }
 }
 
-/// Largest exponent of a motion that was found over `time_s`, given the maxima of its yaw rate (time in s, and height). `None` if it
-/// is not finite.
+/// Largest exponent of a motion that was found over `time_s`, given the maxima of its yaw rate
+/// (time in s, and height). `None` if it is not finite.
 ///
-/// The motion is cut at the maxima, as in [`largest`]; where they are too few, or the growth is not known there, into segments of equal
-/// time.
+/// The motion is cut at the maxima, as in [`largest`]; where they are too few, or the growth is not
+/// known there, into segments of equal time.
 pub(crate) fn largest_of<const K: usize>(
     found: &Trajectory<K>,
     maxima: &[(f64, f64)],
@@ -101,8 +107,9 @@ pub(crate) fn largest_of<const K: usize>(
     exponent.per_s.is_finite().then_some(exponent)
 }
 
-/// Variance of the sum of a correlated sequence of mean zero: prewhitened by a first-order autoregression, then with
-/// Bartlett weights over as many lags as the root of the length. D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992) 953.
+/// Variance of the sum of a correlated sequence of mean zero: prewhitened by a first-order
+/// autoregression, then with Bartlett weights over as many lags as the root of the length. D. W. K.
+/// Andrews, J. C. Monahan, Econometrica 60 (1992) 953.
 fn long_run_variance_sum(sequence: &[f64]) -> f64 {
     let covariance =
         |x: &[f64], lag: usize| -> f64 { x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum() };
@@ -132,12 +139,12 @@ impl std::fmt::Display for Exponent {
     }
 }
 
-/// Largest exponent along the recorded motion of a scenario from the state with index `from` on. `None` if the motion is too
-/// short for a standard error, or not finite.
+/// Largest exponent along the recorded motion of a scenario from the state with index `from` on.
+/// `None` if the motion is too short for a standard error, or not finite.
 ///
-/// The motion is cut at the maxima of the yaw rate, where a periodic motion is at the same phase again. Within a cycle the
-/// vector stretches and shrinks, and what one segment has too much its neighbour has too little, so the standard error takes
-/// the segments' correlation into account.
+/// The motion is cut at the maxima of the yaw rate, where a periodic motion is at the same phase
+/// again. Within a cycle the vector stretches and shrinks, and what one segment has too much its
+/// neighbour has too little, so the standard error takes the segments' correlation into account.
 pub fn largest(scenario: &Scenario<f64>, trace: &Trace, from: usize) -> Option<Exponent> {
     let growth = tangent_growth(scenario, trace)?;
     let warm = from + ((trace.states.len() - from) as f64 * WARM_UP) as usize;
@@ -188,7 +195,8 @@ fn piece_ends(trace: &Trace, from: usize) -> Vec<usize> {
 /// K exponents of a free-running motion, in descending order. `None` stands for minus infinity.
 pub type Spectrum<const K: usize> = [Option<Exponent>; K];
 
-/// Stretching of tangent vectors, as logarithms, over successive segments of equal time; minus infinity stands for a length that has become zero.
+/// Stretching of tangent vectors, as logarithms, over successive segments of equal time; minus
+/// infinity stands for a length that has become zero.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Segments<const K: usize> {
     /// Of `K` lengths in each segment.
@@ -217,16 +225,19 @@ impl<const K: usize> Segments<K> {
     }
 }
 
-/// The K largest Lyapunov exponents of the motion from `start` over `time_s`; K = 1 gives the largest, K = N the spectrum.
+/// The K largest Lyapunov exponents of the motion from `start` over `time_s`; K = 1 gives the
+/// largest, K = N the spectrum.
 ///
-/// K tangent vectors go along in dual numbers and are brought back to right angles and length one behind every step
-/// (Gram-Schmidt, modified); the logarithms of the lengths that this takes away add up to the exponents. G. Benettin,
-/// L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9 and 21; I. Shimada, T. Nagashima, Progress of Theoretical
-/// Physics 61 (1979) 1605. The first tenth of the time is not counted: the vectors turn into their directions.
+/// K tangent vectors go along in dual numbers and are brought back to right angles and length one
+/// behind every step (Gram-Schmidt, modified); the logarithms of the lengths that this takes away
+/// add up to the exponents. G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15
+/// (1980) 9 and 21; I. Shimada, T. Nagashima, Progress of Theoretical Physics 61 (1979) 1605. The
+/// first tenth of the time is not counted: the vectors turn into their directions.
 ///
-/// Where the steering sticks, the linearised step maps all vectors into the hyperplane of steering rate zero and one of them
-/// has no length left. That is exact: the volume of the frame is zero from then on, and the last exponent is minus infinity
-/// (`None`). The vector stays zero. The others do not depend on it, so nothing is seeded anew and all time counts for them.
+/// Where the steering sticks, the linearised step maps all vectors into the hyperplane of steering
+/// rate zero and one of them has no length left. That is exact: the volume of the frame is zero
+/// from then on, and the last exponent is minus infinity (`None`). The vector stays zero. The
+/// others do not depend on it, so nothing is seeded anew and all time counts for them.
 ///
 /// # Errors
 /// If the motion diverges, or is too short.
@@ -293,8 +304,8 @@ pub(crate) fn log_stretching<const N: usize, const K: usize>(
     })
 }
 
-/// Brings the columns to right angles and length one; what their lengths were. A column without a direction of its own becomes
-/// zero.
+/// Brings the columns to right angles and length one; what their lengths were. A column without a
+/// direction of its own becomes zero.
 fn orthonormalise<const N: usize, const K: usize>(frame: &mut SMatrix<f64, N, K>) -> [f64; K] {
     let length = |v: &SVector<f64, N>| v.dot(v).sqrt();
     std::array::from_fn(|k| {
@@ -318,7 +329,8 @@ fn orthonormalise<const N: usize, const K: usize>(frame: &mut SMatrix<f64, N, K>
     })
 }
 
-/// The stretching of K vectors, as logarithms, after the warm-up. `growth` advances by the given number of steps.
+/// The stretching of K vectors, as logarithms, after the warm-up. `growth` advances by the given
+/// number of steps.
 pub(crate) fn over_segments<const N: usize, const K: usize>(
     flow: &impl Flow<N>,
     time_s: f64,

@@ -23,7 +23,8 @@ pub enum Method {
     Twin,
     /// The largest one by synchronisation: [`synchronisation::largest`].
     Synchronisation,
-    /// The threshold of equation (20) as printed, which is a conditional exponent: [`synchronisation::literal`].
+    /// The threshold of equation (20) as printed, which is a conditional exponent:
+    /// [`synchronisation::literal`].
     PrintedResponse,
 }
 
@@ -44,7 +45,8 @@ impl Method {
         matches!(self, Self::Synchronisation | Self::PrintedResponse)
     }
 
-    /// What a motion costs by the method, in seconds of motion at the ECU's fixed step; rounded measurements.
+    /// What a motion costs by the method, in seconds of motion at the ECU's fixed step; rounded
+    /// measurements.
     pub fn cost_s(self, timing: Timing, search: Search) -> f64 {
         let (transient, observed) = match self {
             Self::Tangent => (0.012, 0.026),
@@ -157,8 +159,8 @@ impl Estimate {
     }
 }
 
-/// The exponents of each scenario's motion behind its transient: one estimate, or four of the spectrum. Results are in the
-/// scenarios' order; motions that were not begun have none.
+/// The exponents of each scenario's motion behind its transient: one estimate, or four of the
+/// spectrum. Results are in the scenarios' order; motions that were not begun have none.
 ///
 /// A motion that diverges, or a search that finds nothing, is an estimate that says so.
 ///

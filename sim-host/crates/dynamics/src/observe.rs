@@ -11,11 +11,11 @@ use shared_model::{InvalidScenario, Scenario};
 /// Largest last term of a step's expansion, in rad and rad/s.
 const TOLERANCE: f64 = 1e-10;
 
-/// Follows the scenarios' motions and shows `see` what is found of each behind its transient, with `K` tangent vectors. The
-/// dither is averaged and on from the start.
+/// Follows the scenarios' motions and shows `see` what is found of each behind its transient, with
+/// `K` tangent vectors. The dither is averaged and on from the start.
 ///
-/// Times found count from the transient's end, only that of a divergence from the motion's start. Results are in the
-/// scenarios' order; motions that were not begun have none.
+/// Times found count from the transient's end, only that of a divergence from the motion's start.
+/// Results are in the scenarios' order; motions that were not begun have none.
 ///
 /// # Errors
 /// If a scenario is not valid.
@@ -58,8 +58,9 @@ where
     Ok(results)
 }
 
-/// Whether the engine can follow the motion: its friction has a series between events, and where friction
-/// steps the motion can stick. Else it may slide along the step, meeting it ever more often.
+/// Whether the engine can follow the motion: its friction has a series between events, and where
+/// friction steps the motion can stick. Else it may slide along the step, meeting it ever more
+/// often.
 pub fn is_supported(scenario: &Scenario<f64>) -> Result<bool, InvalidScenario> {
     match Ensemble::new(std::slice::from_ref(scenario)) {
         Ok(_) => {}

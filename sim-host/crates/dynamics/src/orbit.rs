@@ -17,8 +17,8 @@ use shared_model::{InvalidScenario, Scenario};
 pub enum Section {
     /// At the local maxima of the yaw rate, as in the paper's diagrams; their heights are shown.
     YawRateMaxima,
-    /// Where a component rises through a level; the yaw rate is shown, or the sideslip angle where the component is the yaw
-    /// rate.
+    /// Where a component rises through a level; the yaw rate is shown, or the sideslip angle where
+    /// the component is the yaw rate.
     Rising {
         /// The component.
         component: Component,
@@ -112,12 +112,14 @@ pub struct Point {
 
 /// The orbit diagram. Points are in ascending order of the parameter; those not begun are left out.
 ///
-/// From a fixed start the points are independent and made side by side; a continued diagram is made in sequence, and behind
-/// a motion that diverged it begins anew at the scenario's start. Memory grows with the number of points shown, not with
-/// the length of the runs. Time grows with the number of values times the length of a run.
+/// From a fixed start the points are independent and made side by side; a continued diagram is made
+/// in sequence, and behind a motion that diverged it begins anew at the scenario's start. Memory
+/// grows with the number of points shown, not with the length of the runs. Time grows with the
+/// number of values times the length of a run.
 ///
 /// # Errors
-/// If a point's scenario is not valid, or the section is crossed at none of the values though the motions are not at rest.
+/// If a point's scenario is not valid, or the section is crossed at none of the values though the
+/// motions are not at rest.
 ///
 /// ```
 /// use dynamics::orbit::{Outcome, Section, Start, diagram};

@@ -1,4 +1,5 @@
-//! Period of a motion, counted in local maxima of the yaw rate: what the paper's bifurcation diagrams show.
+//! Period of a motion, counted in local maxima of the yaw rate: what the paper's bifurcation
+//! diagrams show.
 
 use crate::trace::Trace;
 use shared_model::vehicle::YAW_RATE;
@@ -21,7 +22,8 @@ pub(super) const AT_REST_RAD_PER_S: f64 = 1e-6;
 pub enum Period {
     /// No motion.
     Equilibrium,
-    /// The maxima repeat after `maxima` of them, to `residual` of the yaw rate's range; the cycle takes `time_s`.
+    /// The maxima repeat after `maxima` of them, to `residual` of the yaw rate's range; the cycle
+    /// takes `time_s`.
     Periodic {
         /// Maxima in a cycle: period-n.
         maxima: usize,
@@ -67,9 +69,9 @@ impl std::fmt::Display for Period {
     }
 }
 
-/// Time (s) and height (rad/s) of each local maximum of the yaw rate from state index `from` on, each from the parabola
-/// through its three highest samples. A maximum counts if the yaw rate rises to it and falls from it by a hundredth of its
-/// range: a ripple makes none.
+/// Time (s) and height (rad/s) of each local maximum of the yaw rate from state index `from` on,
+/// each from the parabola through its three highest samples. A maximum counts if the yaw rate rises
+/// to it and falls from it by a hundredth of its range: a ripple makes none.
 pub fn yaw_rate_maxima(trace: &Trace, from: usize) -> Vec<(f64, f64)> {
     let gamma: Vec<f64> = trace.component(YAW_RATE).skip(from).collect();
     let (low, high) = trace.range(YAW_RATE, from);
@@ -90,7 +92,8 @@ pub fn mean_cycle_s(trace: &Trace) -> Option<f64> {
     (maxima.len() > 1).then(|| (last - first) / (maxima.len() - 1) as f64)
 }
 
-/// Indices of the maxima to which `values` rise by at least `prominence`, and from which they fall by as much.
+/// Indices of the maxima to which `values` rise by at least `prominence`, and from which they fall
+/// by as much.
 pub(crate) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
     let mut maxima = Vec::new();
     let mut rising = false;
@@ -115,20 +118,23 @@ pub(crate) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
     maxima
 }
 
-/// Time (s) and height of the maxima among a quantity's turning points that stand out by a hundredth of its range.
+/// Time (s) and height of the maxima among a quantity's turning points that stand out by a
+/// hundredth of its range.
 pub(crate) fn maxima_of_turns(turns: &[(f64, f64)], range: f64) -> Vec<(f64, f64)> {
     let heights: Vec<f64> = turns.iter().map(|&(_, height)| height).collect();
     let maxima = prominent_maxima(&heights, PROMINENCE * range);
     maxima.into_iter().map(|k| turns[k]).collect()
 }
 
-/// Period of the motion from state index `from` on; maxima count as equal within `tolerance` of the yaw rate's range.
+/// Period of the motion from state index `from` on; maxima count as equal within `tolerance` of the
+/// yaw rate's range.
 pub fn period(trace: &Trace, from: usize, tolerance: f64) -> Period {
     let (low, high) = trace.range(YAW_RATE, from);
     period_of_maxima(&yaw_rate_maxima(trace, from), high - low, tolerance)
 }
 
-/// Period of a motion given its yaw rate's maxima (time in s, height in rad/s) and range (rad/s); as [`period`].
+/// Period of a motion given its yaw rate's maxima (time in s, height in rad/s) and range (rad/s);
+/// as [`period`].
 pub fn period_of_maxima(maxima: &[(f64, f64)], range: f64, tolerance: f64) -> Period {
     if range < AT_REST_RAD_PER_S {
         return Period::Equilibrium;

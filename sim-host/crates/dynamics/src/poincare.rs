@@ -1,11 +1,13 @@
-//! Poincaré section: the states at which a motion crosses a hyperplane, one component at a given value.
+//! Poincaré section: the states at which a motion crosses a hyperplane, one component at a given
+//! value.
 //!
-//! Under the mean of the dither a crossing is a root of the engine's polynomial. Under the true signal it is located within the
-//! ECU's step by the cubic Hermite polynomial through the states and the right-hand sides at both ends: error of fourth order
-//! in the step where the motion is smooth, as the integrator's own (J. R. Dormand, P. J. Prince, Comput. Math. Appl. 12A (1986)
-//! 1007). In a step in which the friction mode changes it is of second order, as the integrator's too. M. Hénon's alternative
-//! (Physica D 5 (1982) 412), the component as independent variable, cannot cross the section of a steering rate that sticks at
-//! zero.
+//! Under the mean of the dither a crossing is a root of the engine's polynomial. Under the true
+//! signal it is located within the ECU's step by the cubic Hermite polynomial through the states
+//! and the right-hand sides at both ends: error of fourth order in the step where the motion is
+//! smooth, as the integrator's own (J. R. Dormand, P. J. Prince, Comput. Math. Appl. 12A (1986)
+//! 1007). In a step in which the friction mode changes it is of second order, as the integrator's
+//! too. M. Hénon's alternative (Physica D 5 (1982) 412), the component as independent variable,
+//! cannot cross the section of a steering rate that sticks at zero.
 
 use crate::component::Component;
 use crate::observe::observe;
@@ -39,7 +41,8 @@ pub enum SectionError {
         /// Its greatest value.
         high: f64,
     },
-    /// The motion leaves all physical bounds, or could not be followed; the time counts from the start.
+    /// The motion leaves all physical bounds, or could not be followed; the time counts from the
+    /// start.
     #[error(transparent)]
     EndsEarly(#[from] EarlyEnd),
 }
@@ -53,8 +56,8 @@ impl From<Unsettled> for SectionError {
     }
 }
 
-/// Crossings of the section by the motion of a scenario, its dither on from the start, within its length behind a transient
-/// of `transient_s`.
+/// Crossings of the section by the motion of a scenario, its dither on from the start, within its
+/// length behind a transient of `transient_s`.
 ///
 /// # Errors
 /// If the scenario is not valid, the motion diverges, or it never crosses the section.
@@ -190,8 +193,8 @@ fn by_steps(
     Ok(passage)
 }
 
-/// Hands the steps behind the transient to `visit`, each with the time of its start (s). Nothing is kept, so that a run may be
-/// long.
+/// Hands the steps behind the transient to `visit`, each with the time of its start (s). Nothing is
+/// kept, so that a run may be long.
 fn for_each_step(
     scenario: &Scenario<f64>,
     transient_s: f64,

@@ -1,8 +1,10 @@
-//! Power spectrum by Welch's method of averaged periodograms (P. D. Welch, IEEE Trans. Audio Electroacoust. 15 (1967) 70).
+//! Power spectrum by Welch's method of averaged periodograms (P. D. Welch, IEEE Trans. Audio
+//! Electroacoust. 15 (1967) 70).
 //!
-//! The signal is cut into segments that overlap by half; each has its mean removed, is weighted with a (periodic) Hann window
-//! and Fourier transformed, and the squared magnitudes are averaged. The density is one-sided, in the signal's unit squared
-//! per Hz: its integral from 0 to half the sample rate is the signal's variance.
+//! The signal is cut into segments that overlap by half; each has its mean removed, is weighted
+//! with a (periodic) Hann window and Fourier transformed, and the squared magnitudes are averaged.
+//! The density is one-sided, in the signal's unit squared per Hz: its integral from 0 to half the
+//! sample rate is the signal's variance.
 
 use crate::words::counted;
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
@@ -19,19 +21,22 @@ const SURROUNDINGS: usize = 16;
 /// A one-sided power spectral density.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PowerSpectrum {
-    /// Distance of two bins, Hz: the sample rate over a segment's samples. A line is about one and a half of it wide (the
-    /// Hann window's equivalent noise bandwidth).
+    /// Distance of two bins, Hz: the sample rate over a segment's samples. A line is about one and
+    /// a half of it wide (the Hann window's equivalent noise bandwidth).
     pub bin_hz: f64,
-    /// Segments that were averaged. The density's relative standard error is about the inverse of its root.
+    /// Segments that were averaged. The density's relative standard error is about the inverse of
+    /// its root.
     pub segments: usize,
-    /// Density of each bin, the signal's unit squared per Hz; that with index `k` is at `k` times `bin_hz`.
+    /// Density of each bin, the signal's unit squared per Hz; that with index `k` is at `k` times
+    /// `bin_hz`.
     pub density: Vec<f64>,
 }
 
 /// A line of a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpectralLine {
-    /// Amplitude of the sine that has the power above the surroundings, in the signal's unit; 0 if there is none.
+    /// Amplitude of the sine that has the power above the surroundings, in the signal's unit; 0 if
+    /// there is none.
     pub amplitude: f64,
     /// Greatest density of the line over the median density of its surroundings.
     pub prominence: f64,
@@ -151,7 +156,8 @@ impl PowerSpectrum {
         self.frequency_hz(peak)
     }
 
-    /// The line at a frequency (Hz); none where the spectrum does not reach, or has no surroundings for it.
+    /// The line at a frequency (Hz); none where the spectrum does not reach, or has no surroundings
+    /// for it.
     pub fn line(&self, frequency_hz: f64) -> Option<SpectralLine> {
         let middle = (frequency_hz / self.bin_hz).round();
         if !(middle >= (LOBE + 2) as f64 && middle < (self.density.len() - LOBE - 2) as f64) {
@@ -177,7 +183,8 @@ impl PowerSpectrum {
 /// Intervals of the frequency axis in a chart.
 const INTERVALS: f64 = 700.0;
 
-/// The density of a signal in `unit` over the frequency, with an instant at a frequency (Hz) if one is given.
+/// The density of a signal in `unit` over the frequency, with an instant at a frequency (Hz) if one
+/// is given.
 pub fn chart(
     spectrum: &PowerSpectrum,
     heading: String,
@@ -186,7 +193,8 @@ pub fn chart(
 ) -> Chart {
     let bins = spectrum.density.iter().enumerate();
     let bins = bins.map(|(k, density)| (spectrum.frequency_hz(k), *density));
-    // Without its mean the signal has nothing at zero frequency, and a logarithmic axis no place for it.
+    // Without its mean the signal has nothing at zero frequency, and a logarithmic axis no place
+    // for it.
     let bins: Vec<(f64, f64)> = bins.skip(1).collect();
     let ends = (bins[0].0, bins[bins.len() - 1].0);
     let panel = Panel {
@@ -211,7 +219,8 @@ pub fn chart(
     }
 }
 
-/// The bin with the greatest density in each of many intervals of equal length on a logarithmic axis.
+/// The bin with the greatest density in each of many intervals of equal length on a logarithmic
+/// axis.
 fn envelope(bins: &[(f64, f64)], (low, high): (f64, f64)) -> Vec<(f64, f64)> {
     let interval = |bin: &(f64, f64)| {
         let share = (bin.0 / low).ln() / (high / low).ln();
@@ -273,7 +282,8 @@ mod tests {
         for segment in [256, 255] {
             let spectrum = welch(&noise(256_000), RATE_HZ, segment).unwrap();
             assert!((spectrum.power() - 1.0).abs() < 0.01);
-            // One-sided: the variance over half the sample rate. 1999 overlapping segments: 2.3 % standard error.
+            // One-sided: the variance over half the sample rate. 1999 overlapping segments: 2.3 %
+            // standard error.
             let flat = 2.0 / RATE_HZ;
             for density in &spectrum.density[2..spectrum.density.len() - 2] {
                 assert!((density / flat - 1.0).abs() < 0.12, "{density}");

@@ -1,8 +1,9 @@
 //! What a steering actuator can produce of the dither.
 //!
-//! The paper adds the dither to the angle ahead of each nonlinearity as if that cost nothing. A motor would have to move the
-//! steering by that angle: at a steering without friction and tyres, (10) becomes J_w delta'' + b_w delta' = r_s tau_M, whose
-//! frequency response is delta/(r_s tau_M) = 1/((i w)^2 J_w + i w b_w). Friction and tyres only take from what is left.
+//! The paper adds the dither to the angle ahead of each nonlinearity as if that cost nothing. A
+//! motor would have to move the steering by that angle: at a steering without friction and tyres,
+//! (10) becomes J_w delta'' + b_w delta' = r_s tau_M, whose frequency response is delta/(r_s tau_M)
+//! = 1/((i w)^2 J_w + i w b_w). Friction and tyres only take from what is left.
 
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use plot::number::four_digits;
@@ -21,13 +22,15 @@ const POINTS_PER_DECADE: f64 = 50.0;
 pub struct Response {
     /// Angular frequency w, rad/s.
     pub frequency_rad_per_s: f64,
-    /// Amplitude of the steering angle over that of the torque, 1/(w sqrt((J_w w)^2 + b_w^2)), rad/(N m).
+    /// Amplitude of the steering angle over that of the torque, 1/(w sqrt((J_w w)^2 + b_w^2)),
+    /// rad/(N m).
     pub magnitude_rad_per_nm: f64,
     /// The same in decibels over 1 rad/(N m).
     pub magnitude_db: f64,
     /// Phase of the angle over the torque, -180 degrees + atan(b_w/(J_w w)), degrees.
     pub phase_deg: f64,
-    /// Torque about the steering axis that the square wave's amplitude would need, taken as a sine, N m.
+    /// Torque about the steering axis that the square wave's amplitude would need, taken as a
+    /// sine, N m.
     pub square_torque_nm: f64,
     /// Torque about the steering axis that the sine's amplitude would need, N m.
     pub sine_torque_nm: f64,
@@ -91,8 +94,9 @@ pub struct Demand {
     pub waveform: Waveform,
     /// Its amplitude W, rad.
     pub amplitude_rad: f64,
-    /// Torque J_w w^2 W that the inertia alone asks for, N m. For the square wave this is that of a sine of the same
-    /// amplitude; its fundamental alone needs 4/pi times as much, its edges any torque there is.
+    /// Torque J_w w^2 W that the inertia alone asks for, N m. For the square wave this is that of
+    /// a sine of the same amplitude; its fundamental alone needs 4/pi times as much, its edges
+    /// any torque there is.
     pub inertia_torque_nm: f64,
     /// The motor's torque about the steering axis, r_s tau_M, N m.
     pub motor_torque_nm: f64,
@@ -206,7 +210,8 @@ mod tests {
         sine_rad: 0.159,
     };
 
-    /// The steering without friction and tyres, its motor current a sine: the model's own right-hand side.
+    /// The steering without friction and tyres, its motor current a sine: the model's own
+    /// right-hand side.
     fn derivative(w: f64, time_s: f64, x: &Vector4<f64>) -> Vector4<f64> {
         let mut scenario = Scenario::reconstruction();
         scenario.friction.law = FrictionLaw::None;
@@ -216,7 +221,8 @@ mod tests {
         Model::new(&scenario).derivative(x, Injection::Off, FrictionMode::Neutral)
     }
 
-    /// Amplitude (rad) and phase (degrees) of the angle in the last of the periods that it takes to settle.
+    /// Amplitude (rad) and phase (degrees) of the angle in the last of the periods that it takes to
+    /// settle.
     fn simulated(w: f64) -> (f64, f64) {
         const STEPS: usize = 400;
         let period_s = TAU / w;

@@ -74,12 +74,13 @@ pub struct Regions {
     pub complete: bool,
 }
 
-/// Classifies the motion from the scenario's start at each of the values, and bisects between neighbours of unlike kind
-/// until the edge is in an interval no wider than `width`.
+/// Classifies the motion from the scenario's start at each of the values, and bisects between
+/// neighbours of unlike kind until the edge is in an interval no wider than `width`.
 ///
-/// All edges are halved side by side. Where the kind in the middle is neither of the two, both halves have an edge, so
-/// cascades unfold. Windows narrower than the step of the sweep between values of the same kind are not seen. Time grows with
-/// the number of values, plus log2(step/width) for each edge, times the length of a run.
+/// All edges are halved side by side. Where the kind in the middle is neither of the two, both
+/// halves have an edge, so cascades unfold. Windows narrower than the step of the sweep between
+/// values of the same kind are not seen. Time grows with the number of values, plus
+/// log2(step/width) for each edge, times the length of a run.
 ///
 /// # Errors
 /// If a value's scenario is not valid.
@@ -187,7 +188,8 @@ pub fn coexisting(
     Ok(values)
 }
 
-/// Maxima of the yaw rate and largest exponents over the parameter, of sweeps from several starts by name.
+/// Maxima of the yaw rate and largest exponents over the parameter, of sweeps from several starts
+/// by name.
 pub fn chart(sweeps: &[(&str, &Regions)], parameter: Parameter) -> Chart {
     let name = parameter.name();
     let samples = || sweeps.iter().flat_map(|(_, found)| &found.samples);

@@ -83,7 +83,8 @@ pub struct Step {
 }
 
 impl Step {
-    /// The crossing of the section within the step, if there is one; its time is that from the step's start.
+    /// The crossing of the section within the step, if there is one; its time is that from the
+    /// step's start.
     pub fn crossing(&self, model: &Model<f64>, section: &Section) -> Option<Crossing> {
         let index = section.component.index;
         let (before, after) = (

@@ -51,8 +51,8 @@ pub fn after_transient(
     Ok(ecu)
 }
 
-/// Why the program's motion from the scenario's start left all bounds within `time_s`: the solution to a tolerance does too, under the
-/// same samples of the dither, or the step is too long.
+/// Why the program's motion from the scenario's start left all bounds within `time_s`: the solution
+/// to a tolerance does too, under the same samples of the dither, or the step is too long.
 pub fn why_unbounded(scenario: &Scenario<f64>, time_s: f64) -> Reason {
     let model = Model::new(scenario);
     let start = model.initial_state(scenario);

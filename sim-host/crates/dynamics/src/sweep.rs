@@ -1,4 +1,5 @@
-//! What sweeps share: the parameter that is swept, its values, the times of a run, and the work on many points at once.
+//! What sweeps share: the parameter that is swept, its values, the times of a run, and the work on
+//! many points at once.
 
 use crate::decimal::{NotSpaced, Spaced};
 use crate::simulate::Unsettled;
@@ -14,7 +15,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Most values of one range.
 const MAX_VALUES: usize = 10_000_000;
 
-/// Most items of a batch: the engine's lanes are full for most of its time, and a stop is heard soon.
+/// Most items of a batch: the engine's lanes are full for most of its time, and a stop is heard
+/// soon.
 pub const LARGEST_BATCH: usize = 64;
 
 /// What a sweep varies.
@@ -149,7 +151,8 @@ impl From<Unsettled> for SweepError {
     }
 }
 
-/// Equally spaced values, each the double nearest to its decimal value; but for those by [`parts`](Self::parts).
+/// Equally spaced values, each the double nearest to its decimal value; but for those by
+/// [`parts`](Self::parts).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Values(Kind);
 
@@ -160,12 +163,12 @@ enum Kind {
 }
 
 impl Values {
-    /// The values from `from` on in steps of `step`, not beyond `to`, which may be the lower one; `what` they are of is for the
-    /// message.
+    /// The values from `from` on in steps of `step`, not beyond `to`, which may be the lower one;
+    /// `what` they are of is for the message.
     ///
     /// # Errors
-    /// If a number is not finite, the step is 0 or leads away from `to`, values are more than ten million, or neighbours are the
-    /// same number.
+    /// If a number is not finite, the step is 0 or leads away from `to`, values are more than ten
+    /// million, or neighbours are the same number.
     pub fn new(what: &'static str, from: f64, to: f64, step: f64) -> Result<Self, SweepError> {
         let refuse = |fault| {
             Err(SweepError::Range {
@@ -219,8 +222,8 @@ impl Values {
         }
     }
 
-    /// The ends of `parts` equal parts from 0 to `to`, as multiples of the double that is nearest to one: the ECU's table is made
-    /// from these, and depends on their last bits.
+    /// The ends of `parts` equal parts from 0 to `to`, as multiples of the double that is nearest
+    /// to one: the ECU's table is made from these, and depends on their last bits.
     ///
     /// # Errors
     /// If `to` is not a positive number, or there is no part.
@@ -381,7 +384,8 @@ impl RunControl<'_> {
         Some(result)
     }
 
-    /// The result of `work`, none if it was interrupted. Without a request to this control, the caller is interrupted.
+    /// The result of `work`, none if it was interrupted. Without a request to this control, the
+    /// caller is interrupted.
     fn unless_interrupted<R>(&self, work: impl FnOnce() -> R) -> Option<R> {
         let result = interrupt::catch(work);
         if result.is_err() && !self.stop.load(Ordering::Relaxed) {
@@ -390,8 +394,8 @@ impl RunControl<'_> {
         result.ok()
     }
 
-    /// Independent work on many items at once. Results are in the items' order whatever the number of threads; items that
-    /// were not begun, or interrupted, have none.
+    /// Independent work on many items at once. Results are in the items' order whatever the number
+    /// of threads; items that were not begun, or interrupted, have none.
     pub fn points<T: Sync, R: Send>(
         &self,
         items: &[T],
@@ -401,8 +405,8 @@ impl RunControl<'_> {
         items.par_iter().with_max_len(1).map(one).collect()
     }
 
-    /// The same for work that takes a batch of items and gives a result for each. Batches are of a size, and as many as keep
-    /// all threads busy.
+    /// The same for work that takes a batch of items and gives a result for each. Batches are of a
+    /// size, and as many as keep all threads busy.
     pub fn batches<T: Sync, R: Send>(
         &self,
         items: &[T],

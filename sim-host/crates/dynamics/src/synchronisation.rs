@@ -1,10 +1,11 @@
 //! Largest Lyapunov exponent by synchronisation, the paper's method, equations (15)-(19).
 //!
-//! A. Stefanski, Chaos, Solitons and Fractals 11 (2000) 2443. A response y' = f(y) + d (x - y) is coupled to the drive
-//! x' = f(x). For a small distance e = y - x this is e' = (Df(x) - d) e. The coupling pulls equally in all directions, so
-//! it commutes with Df and e(t) = exp(-d t) Phi(t) e(0), where Phi is the drive's own tangent map: the distance grows at the
-//! rate of the largest exponent less d. The least d at which it decays is the exponent (19). This holds across friction events
-//! too, where Phi jumps.
+//! A. Stefanski, Chaos, Solitons and Fractals 11 (2000) 2443. A response y' = f(y) + d (x - y) is
+//! coupled to the drive x' = f(x). For a small distance e = y - x this is e' = (Df(x) - d) e. The
+//! coupling pulls equally in all directions, so it commutes with Df and e(t) = exp(-d t) Phi(t)
+//! e(0), where Phi is the drive's own tangent map: the distance grows at the rate of the largest
+//! exponent less d. The least d at which it decays is the exponent (19). This holds across friction
+//! events too, where Phi jumps.
 //!
 //! By the same splitting one step of the coupled pair is one step of the response alone, and then
 //! y = x + (y - x) exp(-d h), which is exact for the coupling.
@@ -21,15 +22,16 @@ const STARTS: usize = 32;
 const LEAST_TOLERANCE_PER_S: f64 = 1e-9;
 /// Distance at which the response begins, and begins anew.
 const DISTANCE: f64 = 1e-8;
-/// It begins anew when it is nearer than this, or further than the other: still where e' = (Df - d) e holds, and well above
-/// rounding.
+/// It begins anew when it is nearer than this, or further than the other: still where e' = (Df - d)
+/// e holds, and well above rounding.
 const NEAR: f64 = 1e-11;
 const FAR: f64 = 1e-5;
 
 /// Where the least synchronising coupling is searched for, and how closely.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Search {
-    /// Lower end of the interval, 1/s. A negative coupling drives the motions apart and finds negative exponents.
+    /// Lower end of the interval, 1/s. A negative coupling drives the motions apart and finds
+    /// negative exponents.
     pub from_per_s: f64,
     /// Upper end of the interval, 1/s.
     pub to_per_s: f64,
@@ -49,7 +51,8 @@ impl Search {
     /// The search itself, if it can be made.
     ///
     /// # Errors
-    /// If the interval is empty, reversed or not finite, or the tolerance is too small or wider than the interval.
+    /// If the interval is empty, reversed or not finite, or the tolerance is too small or wider
+    /// than the interval.
     pub fn validated(self) -> Result<Self, InvalidSearch> {
         let width = self.to_per_s - self.from_per_s;
         let possible = width.is_finite()
@@ -81,7 +84,8 @@ impl Default for Search {
 pub struct Threshold {
     /// Mean over the starts, with its standard error.
     pub exponent: Exponent,
-    /// Width of the interval that each start's search ended with, 1/s: beyond the standard error, the result is not known better.
+    /// Width of the interval that each start's search ended with, 1/s: beyond the standard error,
+    /// the result is not known better.
     pub tolerance_per_s: f64,
 }
 
@@ -108,13 +112,14 @@ pub enum NoThreshold {
     AllSynchronise(Search),
 }
 
-/// Largest Lyapunov exponent of the motion from `start` over `time_s`: the least coupling at which the response (17) follows
-/// the drive, by bisection, separately from 32 starts along the motion.
+/// Largest Lyapunov exponent of the motion from `start` over `time_s`: the least coupling at which
+/// the response (17) follows the drive, by bisection, separately from 32 starts along the motion.
 ///
-/// Each coupling is judged by whether the distance grows or decays on the whole over a thirty-second of the time. The distance begins
-/// anew at 1e-8 whenever it leaves 1e-11 to 1e-5, and what it had grown counts: so neither a burst nor rounding decides. The
-/// response begins on the side of the drive on which it was at the end of the start before (which side does not depend on
-/// the coupling), and for the first start after a tenth of the time that is not counted.
+/// Each coupling is judged by whether the distance grows or decays on the whole over a
+/// thirty-second of the time. The distance begins anew at 1e-8 whenever it leaves 1e-11 to 1e-5,
+/// and what it had grown counts: so neither a burst nor rounding decides. The response begins on
+/// the side of the drive on which it was at the end of the start before (which side does not depend
+/// on the coupling), and for the first start after a tenth of the time that is not counted.
 ///
 /// # Errors
 /// If the motion diverges or is too short, or if the interval does not hold the threshold.
@@ -127,14 +132,16 @@ pub fn largest<const N: usize>(
     least_coupling(flow, |_, _, y| flow.step(y), start, time_s, search)
 }
 
-/// The least coupling at which the response of equation (20), as printed, follows the drive. It is **not** the largest Lyapunov
-/// exponent.
+/// The least coupling at which the response of equation (20), as printed, follows the drive. It is
+/// **not** the largest Lyapunov exponent.
 ///
-/// (20) feeds the response from the drive in two places: y3' takes x4 for y4, and y4' keeps the drive's friction and aligning
-/// torque. Then e3' = -d e3 and e4' = -(b/J + d) e4 whatever the motion does, and the sideslip angle and the yaw rate follow a
-/// steering angle that is given to them. The threshold is the larger of zero and the conditional exponent of (beta, gamma),
-/// that of the pair driven by the steering angle (L. M. Pecora, T. L. Carroll, Physical Review Letters 64 (1990) 821). It can be
-/// positive on a periodic motion: the steering, left out, is what holds that motion together.
+/// (20) feeds the response from the drive in two places: y3' takes x4 for y4, and y4' keeps the
+/// drive's friction and aligning torque. Then e3' = -d e3 and e4' = -(b/J + d) e4 whatever the
+/// motion does, and the sideslip angle and the yaw rate follow a steering angle that is given to
+/// them. The threshold is the larger of zero and the conditional exponent of (beta, gamma), that of
+/// the pair driven by the steering angle (L. M. Pecora, T. L. Carroll, Physical Review Letters 64
+/// (1990) 821). It can be positive on a periodic motion: the steering, left out, is what holds that
+/// motion together.
 ///
 /// # Errors
 /// As [`largest`].
@@ -153,7 +160,8 @@ pub fn literal(
     )
 }
 
-/// One step of (20)'s response without the terms in d: y3 and y4 in closed form, (y1, y2) by Runge-Kutta of fourth order.
+/// One step of (20)'s response without the terms in d: y3 and y4 in closed form, (y1, y2) by
+/// Runge-Kutta of fourth order.
 fn literal_response(
     flow: &VehicleFlow,
     x: &Vector4<f64>,
@@ -183,7 +191,8 @@ fn literal_response(
     Vector4::new(y12[0], y12[1], next[2] + e[2], next[3] + e[3] * decay)
 }
 
-/// The search over a response that makes one step without coupling from (drive, next drive, response).
+/// The search over a response that makes one step without coupling from (drive, next drive,
+/// response).
 fn least_coupling<const N: usize>(
     flow: &impl Flow<N>,
     respond: impl Fn(&SVector<f64, N>, &SVector<f64, N>, &SVector<f64, N>) -> SVector<f64, N>,
@@ -231,8 +240,9 @@ fn least_coupling<const N: usize>(
     })
 }
 
-/// Growth of the logarithm of the response's distance from the drive, each step's distance being multiplied by `pull`, and the
-/// side on which the response is at the end, as it was given for the beginning: a vector of length one.
+/// Growth of the logarithm of the response's distance from the drive, each step's distance being
+/// multiplied by `pull`, and the side on which the response is at the end, as it was given for the
+/// beginning: a vector of length one.
 fn growth<const N: usize>(
     drive: &[SVector<f64, N>],
     respond: &impl Fn(&SVector<f64, N>, &SVector<f64, N>, &SVector<f64, N>) -> SVector<f64, N>,
@@ -257,7 +267,8 @@ fn growth<const N: usize>(
     (grown + (distance / DISTANCE).ln(), e / distance)
 }
 
-/// The coupling from which on the response follows: middle of the interval that bisection ends with.
+/// The coupling from which on the response follows: middle of the interval that bisection ends
+/// with.
 fn bisect(search: Search, mut follows: impl FnMut(f64) -> bool) -> Result<f64, NoThreshold> {
     let (mut below, mut above) = (search.from_per_s, search.to_per_s);
     if !follows(above) {

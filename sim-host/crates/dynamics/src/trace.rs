@@ -59,15 +59,16 @@ impl Trace {
             })
     }
 
-    /// Time at which the numerical solution leaves all physical bounds, if it does, s; [`early_end`](crate::simulate::early_end) finds
-    /// out why.
+    /// Time at which the numerical solution leaves all physical bounds, if it does, s;
+    /// [`early_end`](crate::simulate::early_end) finds out why.
     pub(crate) fn leaves_bounds_at_s(&self) -> Option<f64> {
         let first = self.states.iter().position(|state| !is_bounded(&state.x))?;
         Some(self.time_s(first))
     }
 
-    /// The slow motion under a fast ripple: each state replaced by the mean of those within half of `window_s` of it. The
-    /// first and last states, whose window is not whole, are left out, so the trace begins half a window later.
+    /// The slow motion under a fast ripple: each state replaced by the mean of those within half of
+    /// `window_s` of it. The first and last states, whose window is not whole, are left out, so
+    /// the trace begins half a window later.
     pub fn smoothed(&self, window_s: f64) -> Self {
         let half = (0.5 * window_s / self.step_s).round() as usize;
         let mean = |window: &[State<f64>]| {

@@ -9,13 +9,16 @@ const DISTANCE: f64 = 1e-8;
 /// Time between returns, s; at least a step.
 const INTERVAL_S: f64 = 0.1;
 
-/// Largest Lyapunov exponent of the motion from `start` over `time_s`, by a second motion beside it.
+/// Largest Lyapunov exponent of the motion from `start` over `time_s`, by a second motion beside
+/// it.
 ///
-/// The second one starts 1e-8 away and is brought back to that distance every tenth of a second, along the line that joins the
-/// two; the logarithms of the factors add up to the exponent. G. Benettin, L. Galgani, J.-M. Strelcyn, Physical Review A 14
-/// (1976) 2338. Friction events and stick need no care, since each motion meets its own.
+/// The second one starts 1e-8 away and is brought back to that distance every tenth of a second,
+/// along the line that joins the two; the logarithms of the factors add up to the exponent. G.
+/// Benettin, L. Galgani, J.-M. Strelcyn, Physical Review A 14 (1976) 2338. Friction events and
+/// stick need no care, since each motion meets its own.
 ///
-/// `None` stands for minus infinity: the two motions become one. The first tenth of the time is not counted.
+/// `None` stands for minus infinity: the two motions become one. The first tenth of the time is not
+/// counted.
 ///
 /// # Errors
 /// If the motion diverges, or is too short.

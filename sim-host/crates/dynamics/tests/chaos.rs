@@ -26,7 +26,8 @@ fn exponent(scenario: &Scenario<f64>) -> Exponent {
     largest(scenario, &trace, 0).expect("the run is long enough")
 }
 
-/// The same by two neighbouring motions, which take no derivative and do not go through the ECU's program.
+/// The same by two neighbouring motions, which take no derivative and do not go through the ECU's
+/// program.
 fn twin_exponent_per_s(scenario: &Scenario<f64>) -> f64 {
     let flow = VehicleFlow::new(scenario).expect("the scenario is valid");
     let exponent = two_particle::largest(&flow, &flow.start(), scenario.run.duration_s);
@@ -70,7 +71,8 @@ fn chaotic_and_periodic_motions_are_told_apart() {
     }
 }
 
-/// Down to a stable equilibrium the exponent is the rate at which two motions close in: negative, and it needs no maxima.
+/// Down to a stable equilibrium the exponent is the rate at which two motions close in: negative,
+/// and it needs no maxima.
 #[test]
 fn an_equilibrium_has_a_negative_exponent() {
     let mut scenario = Scenario::<f64>::reconstruction();

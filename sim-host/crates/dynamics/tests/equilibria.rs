@@ -23,8 +23,8 @@ fn at(rpm: f64, law: FrictionLaw) -> Scenario<f64> {
     scenario
 }
 
-/// The balance has a closed form: the motor fixes the front force, the yaw moment the rear one, and each cubic tyre gives a
-/// force that small at three slip angles.
+/// The balance has a closed form: the motor fixes the front force, the yaw moment the rear one, and
+/// each cubic tyre gives a force that small at three slip angles.
 #[test]
 fn all_nine_are_found_and_balance() {
     for rpm in [800.0, 1750.0] {
@@ -84,8 +84,8 @@ fn a_long_motion_rests_where_the_equilibrium_is() {
     }
 }
 
-/// Growth rate (1/s) and angular frequency (rad/s) of a small oscillation about an equilibrium, from the maxima of its yaw
-/// rate.
+/// Growth rate (1/s) and angular frequency (rad/s) of a small oscillation about an equilibrium,
+/// from the maxima of its yaw rate.
 fn oscillation(scenario: &Scenario<f64>, equilibrium: &Equilibrium) -> (f64, f64) {
     let mut motion = Stepper::new(scenario).expect("valid");
     let off = Vector4::new(1e-5, 0.0, 0.0, 0.0);

@@ -38,8 +38,8 @@ impl<F: Field> Flow<3> for Equation<F> {
     }
 }
 
-/// E. N. Lorenz, sigma = 10, rho = 28, beta = 8/3. Exponents 0.9056, 0, -14.5723: J. C. Sprott, Chaos and Time-Series
-/// Analysis (2003), table of common chaotic systems.
+/// E. N. Lorenz, sigma = 10, rho = 28, beta = 8/3. Exponents 0.9056, 0, -14.5723: J. C. Sprott,
+/// Chaos and Time-Series Analysis (2003), table of common chaotic systems.
 struct Lorenz;
 
 impl Field for Lorenz {
@@ -111,8 +111,8 @@ fn synchronised<const N: usize>(flow: &impl Flow<N>, x: &SVector<f64, N>, time_s
     (per_s, error.hypot(threshold.tolerance_per_s))
 }
 
-/// The three methods, each on its own stretch of the motion, so that their errors are independent, against each other and against
-/// a published figure.
+/// The three methods, each on its own stretch of the motion, so that their errors are independent,
+/// against each other and against a published figure.
 fn assert_exponent<const N: usize>(
     flow: &impl Flow<N>,
     start: &SVector<f64, N>,
@@ -203,8 +203,8 @@ fn vehicle(rpm: f64, law: FrictionLaw) -> (VehicleFlow, Vector4<f64>) {
 
 const LAWS: [FrictionLaw; 2] = [FrictionLaw::CoulombRate, FrictionLaw::None];
 
-/// On one stretch of the motion the methods must give the same figure, but for the search's tolerance and what the stretch's
-/// ends add; on different stretches, within their errors.
+/// On one stretch of the motion the methods must give the same figure, but for the search's
+/// tolerance and what the stretch's ends add; on different stretches, within their errors.
 #[test]
 fn the_three_methods_agree_on_the_vehicle() {
     for law in LAWS {
@@ -227,8 +227,8 @@ fn the_three_methods_agree_on_the_vehicle() {
     }
 }
 
-/// Along the motion nothing grows or shrinks: one exponent of any motion that is not at rest is zero. On a periodic one it is the
-/// largest, on a chaotic one the second.
+/// Along the motion nothing grows or shrinks: one exponent of any motion that is not at rest is
+/// zero. On a periodic one it is the largest, on a chaotic one the second.
 #[test]
 fn one_exponent_is_zero() {
     for (rpm, index) in [
@@ -304,7 +304,8 @@ fn the_spectrum_adds_up_to_the_mean_divergence() {
     }
 }
 
-/// Exponent of sideslip angle and yaw rate alone, the steering angle being given: their tangent vector by the midpoint rule.
+/// Exponent of sideslip angle and yaw rate alone, the steering angle being given: their tangent
+/// vector by the midpoint rule.
 fn conditional_per_s(flow: &VehicleFlow, start: &Vector4<f64>) -> f64 {
     let mut x = *start;
     let mut w = Vector2::new(1.0, 0.0);
@@ -323,8 +324,8 @@ fn conditional_per_s(flow: &VehicleFlow, start: &Vector4<f64>) -> f64 {
     growth / TIME_S
 }
 
-/// Equation (20) as printed gives the conditional exponent of sideslip angle and yaw rate. It is positive on periodic motions, so
-/// it cannot tell chaos.
+/// Equation (20) as printed gives the conditional exponent of sideslip angle and yaw rate. It is
+/// positive on periodic motions, so it cannot tell chaos.
 #[test]
 fn the_printed_response_misleads() {
     for rpm in [1600.0, 1845.0] {

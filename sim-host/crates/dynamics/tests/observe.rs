@@ -1,4 +1,5 @@
-//! What motions do behind their transients: by the engine, against the reference integrator and against the ECU's fixed step.
+//! What motions do behind their transients: by the engine, against the reference integrator and
+//! against the ECU's fixed step.
 
 use dynamics::attractor::{Kind, attractor};
 use dynamics::fixed_step;
@@ -66,7 +67,8 @@ fn motions_end_where_the_references_do() {
     }
 }
 
-/// Periodic motions have the same extents and exponents, chaotic ones within what their length leaves open.
+/// Periodic motions have the same extents and exponents, chaotic ones within what their length
+/// leaves open.
 #[test]
 fn the_fixed_step_ends_on_the_same_attractors() {
     let timing = Timing::new(200.0, 600.0).expect("valid");
@@ -107,8 +109,8 @@ fn the_fixed_step_ends_on_the_same_attractors() {
     }
 }
 
-/// Under the sign of the steering angle as printed, dithered, the motion of period one slides along a step of the friction: it is
-/// followed all the same, and does not leave its bounds.
+/// Under the sign of the steering angle as printed, dithered, the motion of period one slides along
+/// a step of the friction: it is followed all the same, and does not leave its bounds.
 #[test]
 fn sliding_motions_are_followed() {
     let mut scenario = Scenario::printed();
@@ -140,7 +142,8 @@ fn crossings_are_those_of_the_fixed_step() {
     }
 }
 
-/// Scenarios that the engine follows and those that it does not keep their places, and each is counted.
+/// Scenarios that the engine follows and those that it does not keep their places, and each is
+/// counted.
 #[test]
 fn results_are_in_the_scenarios_order() {
     let scenarios: Vec<_> = (0..70)

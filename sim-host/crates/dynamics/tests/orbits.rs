@@ -1,4 +1,5 @@
-//! Regions, orbit diagrams and basins of the paper's vehicle against the paper and against each other.
+//! Regions, orbit diagrams and basins of the paper's vehicle against the paper and against each
+//! other.
 
 use dynamics::attractor::{Kind, attractor};
 use dynamics::basin::{Cell, basin};
@@ -60,8 +61,8 @@ fn the_papers_four_speeds() {
     }
 }
 
-/// Chaos begins within 7 rpm of the paper's 1645. At its 1825 the chaos splits into three bands, out of which period 3
-/// comes, and that ends at its 1855.
+/// Chaos begins within 7 rpm of the paper's 1645. At its 1825 the chaos splits into three bands,
+/// out of which period 3 comes, and that ends at its 1855.
 #[test]
 fn edges_are_near_the_papers() {
     let sweep = over_speed(1620.0, 1890.0, 15.0);
@@ -84,7 +85,8 @@ fn edges_are_near_the_papers() {
     }
 }
 
-/// The sine's period one ends a fiftieth short of the paper's 1.2 V: from there on the motion comes to rest.
+/// The sine's period one ends a fiftieth short of the paper's 1.2 V: from there on the motion comes
+/// to rest.
 #[test]
 fn dither_makes_period_one_where_the_paper_has_it() {
     let kind = |waveform, amplitude_v| {
@@ -169,8 +171,9 @@ fn continuation_upwards_and_downwards_agree_on_a_period() {
     }
 }
 
-/// A section in the steering rate: a period-2 orbit, which steers once to and fro for each maximum, meets it in few points;
-/// one far out is never crossed, and the message says where the motion stays.
+/// A section in the steering rate: a period-2 orbit, which steers once to and fro for each maximum,
+/// meets it in few points; one far out is never crossed, and the message says where the motion
+/// stays.
 #[test]
 fn sections_are_crossed_or_said_not_to_be() {
     let range = values(1600.0, 1600.0, 1.0);
@@ -249,7 +252,8 @@ fn starts_end_on_the_attractors_of_both_lobes_or_diverge() {
     assert_eq!(away.attractors[cell.attractor].kind, Kind::Diverges);
 }
 
-/// At 16 rad of slip the cubic tyre is so stiff that a step of 1 ms overshoots and diverges. The motion itself comes back.
+/// At 16 rad of slip the cubic tyre is so stiff that a step of 1 ms overshoots and diverges. The
+/// motion itself comes back.
 #[test]
 fn a_stiff_start_comes_back_from_far_out() {
     let mut far = at(1600.0);
@@ -261,7 +265,8 @@ fn a_stiff_start_comes_back_from_far_out() {
     assert_eq!(found.kind, Kind::Periodic(2));
 }
 
-/// Friction holds a vehicle that has come to rest: upwards the cycle lasts beyond 1.14 V, downwards rest does.
+/// Friction holds a vehicle that has come to rest: upwards the cycle lasts beyond 1.14 V, downwards
+/// rest does.
 #[test]
 fn hysteresis_shows_where_two_attractors_coexist() {
     let mut scenario = at(1750.0);

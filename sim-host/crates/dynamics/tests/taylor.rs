@@ -173,7 +173,8 @@ fn turning_points_and_extents_are_exact() {
         before = (x[1], x[1] - before.0);
     }
     for i in 0..4 {
-        // Samples a ten-thousandth of a second apart miss the extremes by 1e-6 at most, and a kink by more.
+        // Samples a ten-thousandth of a second apart miss the extremes by 1e-6 at most, and a kink
+        // by more.
         let miss = if i == 3 { 1e-2 } else { 1e-6 };
         assert!(
             found.lower[i] <= lower[i] + 1e-9 && lower[i] - found.lower[i] < miss,
@@ -246,8 +247,8 @@ fn exponents_are_those_of_the_fixed_step() {
     }
 }
 
-/// What the first tangent vector has grown by at turning points of the yaw rate is what it would have grown by if the motion ended
-/// there.
+/// What the first tangent vector has grown by at turning points of the yaw rate is what it would
+/// have grown by if the motion ended there.
 #[test]
 fn growth_at_turns_is_that_of_shorter_motions() {
     let scenario = at_speed(1750.0);
@@ -286,7 +287,8 @@ fn growth_at_turns_is_that_of_shorter_motions() {
     }
 }
 
-/// Without friction the sum of all exponents is the mean of the divergence, which the frame's volume must follow exactly.
+/// Without friction the sum of all exponents is the mean of the divergence, which the frame's
+/// volume must follow exactly.
 #[test]
 fn the_largest_exponent_alone_and_in_the_spectrum_are_one() {
     let mut scenario = at_speed(1845.0);

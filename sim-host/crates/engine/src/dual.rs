@@ -1,7 +1,8 @@
 //! Dual numbers: a value and its derivatives along N tangent vectors.
 //!
-//! The model evaluated in them is its own linearisation. Through a step that is split at a friction event the derivative
-//! of the event's time goes along, so the result is the linearised flow with the right jump (saltation) at the event.
+//! The model evaluated in them is its own linearisation. Through a step that is split at a friction
+//! event the derivative of the event's time goes along, so the result is the linearised flow with
+//! the right jump (saltation) at the event.
 
 use shared_model::Real;
 use std::cmp::Ordering;

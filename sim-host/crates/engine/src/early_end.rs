@@ -6,7 +6,8 @@ use shared_model::Real;
 /// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
 pub(crate) const BOUND: f64 = 1e3;
 
-/// Whether a state vector is one of a vehicle at all: finite, and within any bounds that one could keep.
+/// Whether a state vector is one of a vehicle at all: finite, and within any bounds that one could
+/// keep.
 pub fn is_bounded<T: Real>(x: &Vector4<T>) -> bool {
     x.iter().all(|value| value.to_f64().abs() < BOUND)
 }
@@ -52,13 +53,16 @@ impl EarlyEnd {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
-    /// The solution itself leaves all physical bounds: angles in rad and rates in rad/s below a thousand.
+    /// The solution itself leaves all physical bounds: angles in rad and rates in rad/s below a
+    /// thousand.
     #[error("diverges")]
     Diverges,
-    /// The numerical solution left the bounds, while the solution to a tolerance stays within them: the fixed step is unstable.
+    /// The numerical solution left the bounds, while the solution to a tolerance stays within them:
+    /// the fixed step is unstable.
     #[error("step too long")]
     StepTooLong,
-    /// Mode transitions of the friction follow each other without end: a sliding mode, which an integrator between events cannot pass.
+    /// Mode transitions of the friction follow each other without end: a sliding mode, which an
+    /// integrator between events cannot pass.
     #[error("chattering friction")]
     Chattering,
     /// The tolerance asks for more steps per second of motion than a run may take.

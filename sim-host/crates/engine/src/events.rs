@@ -6,8 +6,8 @@ use shared_model::friction::{FrictionMode, Sign};
 use shared_model::tire::Tire;
 use shared_model::vehicle::{Model, SIDESLIP, STEERING_ANGLE, YAW_RATE};
 
-/// Share of the friction limit by which the torque must exceed it before the steering is released. At rest right at the limit
-/// rounding would otherwise release it and stop it without end.
+/// Share of the friction limit by which the torque must exceed it before the steering is released.
+/// At rest right at the limit rounding would otherwise release it and stop it without end.
 const RELEASE_MARGIN: f64 = 1e-10;
 /// Rounding of the driving torque, in units of the last place of its greatest term.
 const ROUNDING_ULPS: f64 = 16.0;
@@ -15,8 +15,8 @@ const ROUNDING_ULPS: f64 = 16.0;
 /// The quantity that must stay within bounds for a friction mode to last.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Guard {
-    /// The lower bound; minus infinity where there is none. Of the driving torque (N m) while sticking, else of the friction
-    /// law's argument (rad or rad/s).
+    /// The lower bound; minus infinity where there is none. Of the driving torque (N m) while
+    /// sticking, else of the friction law's argument (rad or rad/s).
     pub lower: f64,
     /// The upper bound; infinity where there is none.
     pub upper: f64,
@@ -58,8 +58,9 @@ impl Guard {
     }
 }
 
-/// The driving torque up to which a steering at rest sticks, N m: the friction limit, and a margin that rounding cannot pass. Without it
-/// a friction weaker than the rounding of the torque would change its mode for ever as the steering comes to rest.
+/// The driving torque up to which a steering at rest sticks, N m: the friction limit, and a margin
+/// that rounding cannot pass. Without it a friction weaker than the rounding of the torque would
+/// change its mode for ever as the steering comes to rest.
 fn held_torque_nm(model: &Model<f64>, injection: Injection<f64>, x: &Vector4<f64>) -> f64 {
     let limit_nm = model.friction_limit_nm();
     let constants = model.constants();
@@ -82,7 +83,8 @@ fn held_torque_nm(model: &Model<f64>, injection: Injection<f64>, x: &Vector4<f64
     (limit_nm * (1.0 + RELEASE_MARGIN)).max(limit_nm + rounding_nm)
 }
 
-/// The mode that follows `from`, which ends at `x`; puts the friction law's argument exactly on the step that it passes.
+/// The mode that follows `from`, which ends at `x`; puts the friction law's argument exactly on the
+/// step that it passes.
 pub fn next_mode(
     model: &Model<f64>,
     injection: Injection<f64>,

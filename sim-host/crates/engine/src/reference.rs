@@ -1,10 +1,12 @@
-//! Reference integrator: the motion between friction events to a tolerance, and the events' instants to 1e-12 s.
+//! Reference integrator: the motion between friction events to a tolerance, and the events'
+//! instants to 1e-12 s.
 //!
-//! Between events the right-hand side is smooth. There Gragg's modified midpoint rule is extrapolated to high order
-//! (Bulirsch and Stoer; E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, section II.9), each
-//! step being halved until two successive orders agree. Where an event lies within a step, its instant is found by integrating
-//! to trial instants, and the motion goes on from there in the new mode. What the ECU's fixed step makes of the same motion is
-//! compared against it.
+//! Between events the right-hand side is smooth. There Gragg's modified midpoint rule is
+//! extrapolated to high order (Bulirsch and Stoer; E. Hairer, S. P. Norsett, G. Wanner, Solving
+//! Ordinary Differential Equations I, section II.9), each step being halved until two successive
+//! orders agree. Where an event lies within a step, its instant is found by integrating
+//! to trial instants, and the motion goes on from there in the new mode. What the ECU's fixed step
+//! makes of the same motion is compared against it.
 
 use crate::dual::Dual;
 use crate::early_end::{EarlyEnd, Reason, is_bounded};
@@ -17,7 +19,8 @@ use shared_model::{InvalidScenario, Scenario};
 
 /// Columns of the extrapolation: order 12.
 const COLUMNS: usize = 6;
-/// Longest step, s: short against any motion of the vehicle, so that an event function has at most one extremum in it.
+/// Longest step, s: short against any motion of the vehicle, so that an event function has at most
+/// one extremum in it.
 const LONGEST_STEP_S: f64 = 0.01;
 /// Shortest step, s; where even it does not meet the tolerance, rounding is all that is left.
 const SHORTEST_STEP_S: f64 = 1e-7;
@@ -25,7 +28,8 @@ const SHORTEST_STEP_S: f64 = 1e-7;
 pub(crate) const EVENT_TOLERANCE_S: f64 = 1e-12;
 /// Most trial instants for one event; bisection alone would need 34.
 const MOST_TRIALS: usize = 60;
-/// Steps, events included, that a run may take: at once, and per second of motion. The motions of the paper take some 150 per second.
+/// Steps, events included, that a run may take: at once, and per second of motion. The motions of
+/// the paper take some 150 per second.
 const STEPS_AT_ONCE: f64 = 1e4;
 const STEPS_PER_S: f64 = 1e5;
 /// Tolerance of the solution that decides whether a motion diverges.
@@ -33,8 +37,8 @@ pub const DECISIVE_TOLERANCE: f64 = 1e-8;
 /// By this much later it may diverge than the numerical solution, s.
 pub const DECISIVE_MARGIN_S: f64 = 1.0;
 
-/// Why a numerical solution of a motion left all bounds within `time_s` from `start`: the motion itself does, or it stays bounded
-/// when it is integrated to a tolerance.
+/// Why a numerical solution of a motion left all bounds within `time_s` from `start`: the motion
+/// itself does, or it stays bounded when it is integrated to a tolerance.
 pub fn why_unbounded(
     model: &Model<f64>,
     injection: Injection<f64>,
@@ -59,7 +63,8 @@ pub struct Event {
     pub to: FrictionMode,
 }
 
-/// A motion of the averaged system under the reference integrator. The dither, if there is one, is on from the start.
+/// A motion of the averaged system under the reference integrator. The dither, if there is one, is
+/// on from the start.
 #[derive(Debug, Clone)]
 pub struct Reference {
     model: Model<f64>,
@@ -75,7 +80,8 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// The motion of a scenario from its start; each smooth step is accurate to `tolerance` in every component.
+    /// The motion of a scenario from its start; each smooth step is accurate to `tolerance` in
+    /// every component.
     ///
     /// # Errors
     /// If the scenario is not valid.
@@ -89,7 +95,8 @@ impl Reference {
         Ok(Self::from_state(&model, injection, &start, tolerance))
     }
 
-    /// The motion of a model from a state; each smooth step is accurate to `tolerance` in every component.
+    /// The motion of a model from a state; each smooth step is accurate to `tolerance` in every
+    /// component.
     pub fn from_state(
         model: &Model<f64>,
         injection: Injection<f64>,
@@ -137,8 +144,8 @@ impl Reference {
     /// Continues for `span_s` seconds.
     ///
     /// # Errors
-    /// If the motion diverges, or takes more steps or mode transitions than a motion of that length may. The present state is then the
-    /// last one.
+    /// If the motion diverges, or takes more steps or mode transitions than a motion of that length
+    /// may. The present state is then the last one.
     pub fn run(&mut self, span_s: f64) -> Result<&State<f64>, EarlyEnd> {
         let end_s = self.time_s + span_s;
         // What rounding of the sum leaves is no step.
@@ -214,7 +221,8 @@ impl Reference {
         (previous[COLUMNS - 1], error)
     }
 
-    /// Gragg's modified midpoint rule with an even number of substeps: its error has even powers of the substep only.
+    /// Gragg's modified midpoint rule with an even number of substeps: its error has even powers of
+    /// the substep only.
     fn midpoint(&self, step_s: f64, substeps: usize) -> Vector4<f64> {
         let h = step_s / substeps as f64;
         let mut before = self.state.x;
@@ -232,8 +240,8 @@ impl Reference {
             .derivative(x, self.injection, self.state.friction)
     }
 
-    /// How far a state is within the bounds of the present mode, and the rate at which that changes along the motion. Infinite for a
-    /// mode that never ends.
+    /// How far a state is within the bounds of the present mode, and the rate at which that changes
+    /// along the motion. Infinite for a mode that never ends.
     fn margin_and_rate(&self, x: &Vector4<f64>) -> (f64, f64) {
         let along = x.zip_map(&self.slope(x), |value, slope| Dual::new(value, [slope]));
         let guarded: Dual<1> = match self.state.friction {
@@ -272,8 +280,8 @@ impl Reference {
         None
     }
 
-    /// Instant in a step at which `f` goes from positive to negative, by the Illinois form of regula falsi, and by bisection
-    /// where that is slow.
+    /// Instant in a step at which `f` goes from positive to negative, by the Illinois form of
+    /// regula falsi, and by bisection where that is slow.
     fn root(&self, step_s: f64, f: impl Fn(&Vector4<f64>) -> f64) -> f64 {
         let at = |instant_s: f64| f(&self.extrapolate(instant_s).0);
         let (mut low, mut high) = (0.0, step_s);

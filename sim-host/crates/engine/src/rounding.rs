@@ -1,9 +1,11 @@
-//! Running error analysis: a value, and a bound on how far the same computation in f32 can be from it.
+//! Running error analysis: a value, and a bound on how far the same computation in f32 can be from
+//! it.
 //!
-//! Each operation rounds its exact result by at most the unit roundoff u = 2^-24 of it. A [`Rounded`] carries the value as
-//! f64 has it (whose own rounding, 2^-29 of that of f32, is left out) and adds up what the operands' errors and the
-//! operation's rounding can amount to. The model evaluated in it bounds the ECU's error step by step, from the model's own
-//! text. Reference: N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 3.3.
+//! Each operation rounds its exact result by at most the unit roundoff u = 2^-24 of it. A
+//! [`Rounded`] carries the value as f64 has it (whose own rounding, 2^-29 of that of f32, is left
+//! out) and adds up what the operands' errors and the operation's rounding can amount to. The model
+//! evaluated in it bounds the ECU's error step by step, from the model's own text. Reference: N. J.
+//! Higham, Accuracy and Stability of Numerical Algorithms, section 3.3.
 
 use shared_model::Real;
 use shared_model::dither::OSCILLATOR_SINE_ERROR;
@@ -31,7 +33,8 @@ impl Rounded {
         }
     }
 
-    /// The rounded result of an operation: its exact value, and how far the operands' errors can move it.
+    /// The rounded result of an operation: its exact value, and how far the operands' errors can
+    /// move it.
     fn of(value: f64, propagated: f64) -> Self {
         Self {
             value,
@@ -39,7 +42,8 @@ impl Rounded {
         }
     }
 
-    /// As [`of`](Self::of) for a library function whose result is within one unit in the last place, twice the roundoff.
+    /// As [`of`](Self::of) for a library function whose result is within one unit in the last
+    /// place, twice the roundoff.
     fn of_function(value: f64, propagated: f64) -> Self {
         Self {
             value,

@@ -6,7 +6,8 @@ use shared_model::dither::{Application, Injection};
 use shared_model::vehicle::{Model, State};
 use shared_model::{InvalidScenario, Real, Scenario, integrate};
 
-/// A trajectory of the averaged system at a fixed step. The dither, if there is one, is on from the start.
+/// A trajectory of the averaged system at a fixed step. The dither, if there is one, is on from the
+/// start.
 #[derive(Debug, Clone)]
 pub struct Stepper<T> {
     model: Model<T>,
@@ -49,11 +50,12 @@ impl<T: Real> Stepper<T> {
         &self.state
     }
 
-    /// Runs as many steps as fit into `time_s`, and shows `see` each state with its time from now, s.
+    /// Runs as many steps as fit into `time_s`, and shows `see` each state with its time from now,
+    /// s.
     ///
     /// # Errors
-    /// As soon as the state leaves all physical bounds; `see` is not shown that state. The reference integrator decides whether the
-    /// motion itself does, or the step is too long.
+    /// As soon as the state leaves all physical bounds; `see` is not shown that state. The
+    /// reference integrator decides whether the motion itself does, or the step is too long.
     pub fn observe(
         &mut self,
         time_s: f64,

@@ -6,8 +6,9 @@ use shared_model::Scenario;
 use shared_model::friction::{FrictionLaw, FrictionMode};
 use shared_model::vehicle::{STEERING_ANGLE, STEERING_RATE};
 
-/// A spring with dry friction: the front tyre as a linear spring on the steering (a cubic tyre without cubic term, of the usual
-/// sign), and a chassis so heavy and fast that it does not take part.
+/// A spring with dry friction: the front tyre as a linear spring on the steering (a cubic tyre
+/// without cubic term, of the usual sign), and a chassis so heavy and fast that it does not take
+/// part.
 fn stick_slip_oscillator() -> Scenario<f64> {
     let mut scenario = Scenario::reconstruction();
     scenario.vehicle.mass_kg = 1e5;
@@ -33,8 +34,9 @@ fn stick_slip_oscillator() -> Scenario<f64> {
     scenario
 }
 
-/// Stiffness 10 N m/rad, inertia 0.1: 10 rad/s. Each half period of pi/10 s turns at an amplitude smaller by twice 0.1/10 rad,
-/// and the steering sticks where it turns within 0.01 rad of the middle.
+/// Stiffness 10 N m/rad, inertia 0.1: 10 rad/s. Each half period of pi/10 s turns at an amplitude
+/// smaller by twice 0.1/10 rad, and the steering sticks where it turns within 0.01 rad of the
+/// middle.
 #[test]
 fn a_stick_slip_oscillator_keeps_its_closed_form() {
     let mut reference = Reference::new(&stick_slip_oscillator(), 1e-13).expect("valid");
@@ -100,7 +102,8 @@ fn the_reference_agrees_with_itself() {
     }
 }
 
-/// Observed order of the ECU's step against the reference, fitted over step lengths from 4 ms down, four a halving.
+/// Observed order of the ECU's step against the reference, fitted over step lengths from 4 ms down,
+/// four a halving.
 fn observed_order(law: FrictionLaw, halvings: u32) -> f64 {
     let mut scenario = Scenario::<f64>::reconstruction();
     scenario.friction.law = law;

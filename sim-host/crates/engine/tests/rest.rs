@@ -1,5 +1,6 @@
-//! The integrators at rest, at exact zeros and at the ends of the parameters' ranges: they end, they stay bounded where the reference
-//! does, and at rest the exponent is the greatest real part of the eigenvalues.
+//! The integrators at rest, at exact zeros and at the ends of the parameters' ranges: they end,
+//! they stay bounded where the reference does, and at rest the exponent is the greatest real part
+//! of the eigenvalues.
 
 use engine::Reason;
 use engine::dual::Dual;
@@ -109,11 +110,13 @@ fn jacobian(
     Matrix4::from_fn(|i, k| slope[i].tangent[k])
 }
 
-/// Greatest real part of the eigenvalues of the motion near rest; where the steering sticks, of the motion that is left.
+/// Greatest real part of the eigenvalues of the motion near rest; where the steering sticks, of the
+/// motion that is left.
 fn greatest_real_part(jacobian: &Matrix4<f64>, sticks: bool) -> f64 {
     let mut jacobian = *jacobian;
     if sticks {
-        // The steering angle stays as it is, and its rate is zero: a direction that neither grows nor decays, and one that is none.
+        // The steering angle stays as it is, and its rate is zero: a direction that neither grows
+        // nor decays, and one that is none.
         jacobian.row_mut(STEERING_RATE).fill(0.0);
         jacobian[(STEERING_RATE, STEERING_RATE)] = -1e9;
     }
@@ -143,13 +146,14 @@ fn exponents_at_rest(scenario: &Scenario<f64>, found: &Trajectory<1>) -> Option<
     Some((mean, wanted))
 }
 
-/// A focus grows unevenly within a turn, and directions of nearly the same rate part slowly: some e-folds over the time.
+/// A focus grows unevenly within a turn, and directions of nearly the same rate part slowly: some
+/// e-folds over the time.
 fn tolerance(wanted_per_s: f64) -> f64 {
     4.0 / (0.5 * OBSERVED_S) + 1e-3 * wanted_per_s.abs()
 }
 
-/// Trajectories that come to rest, in all ways that there are: free and stuck, at a focus and at a node, with friction of no torque, of less
-/// than rounding, and of the paper's.
+/// Trajectories that come to rest, in all ways that there are: free and stuck, at a focus and at a
+/// node, with friction of no torque, of less than rounding, and of the paper's.
 #[test]
 fn the_exponent_at_rest_is_the_greatest_real_part() {
     let (mut free, mut stuck) = (0, 0);

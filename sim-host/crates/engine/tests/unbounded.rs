@@ -22,7 +22,8 @@ fn by_engine(scenario: &Scenario<f64>) -> Option<EarlyEnd> {
     motions.integrate::<0>(&span).remove(0).early_end
 }
 
-/// At 8 rad of slip the cubic tyre is so stiff that a step of 1 ms overshoots. The motion comes back.
+/// At 8 rad of slip the cubic tyre is so stiff that a step of 1 ms overshoots. The motion comes
+/// back.
 #[test]
 fn a_step_that_overshoots_is_too_long() {
     for start_rad in [-8.0, 3.0, 8.0, 10.0] {
@@ -44,7 +45,8 @@ fn a_step_that_overshoots_is_too_long() {
     );
 }
 
-/// The high-friction road's cubic tyre is not bounded: its motion diverges, whatever the integrator and the step.
+/// The high-friction road's cubic tyre is not bounded: its motion diverges, whatever the integrator
+/// and the step.
 #[test]
 fn a_motion_that_diverges_is_named_so() {
     let mut scenario = Scenario::reconstruction();

@@ -13,8 +13,8 @@ pub const IMAGE_BYTES: u64 = 256 << 20;
 /// Number of first bytes that identify the type of a file.
 const START_BYTES: u64 = 64;
 
-/// Reads a file of at most `most` bytes. If its first bytes are not of the expected type, only these are read and returned, and the
-/// caller rejects them.
+/// Reads a file of at most `most` bytes. If its first bytes are not of the expected type, only
+/// these are read and returned, and the caller rejects them.
 ///
 /// # Errors
 /// If it cannot be read, or is longer.

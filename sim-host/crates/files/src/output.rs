@@ -111,7 +111,8 @@ impl Outputs {
         self.take(option, path, identity)
     }
 
-    /// Checks that files can be written into the folder, which may be missing, and that it is not that of another option.
+    /// Checks that files can be written into the folder, which may be missing, and that it is not
+    /// that of another option.
     ///
     /// # Errors
     /// The first violation.

@@ -15,7 +15,8 @@ pub enum AnalysisError {
     /// The image was compiled without stack sizes.
     #[error("the image has no section .stack_sizes; compile it with -Zemit-stack-sizes")]
     NoStackSizes,
-    /// Names or functions lie over each other, so that reading them takes far longer than the file is.
+    /// Names or functions lie over each other, so that reading them takes far longer than the file
+    /// is.
     #[error(
         "the image's {0} overlap, so that they are many times as long as the file; it is damaged"
     )]

@@ -1,10 +1,12 @@
-//! Limits on reading an image. A damaged image may claim that all symbols have the same name of a megabyte, or that all functions
-//! are the same code. The number of bytes read is bounded by the length of the file.
+//! Limits on reading an image. A damaged image may claim that all symbols have the same name of a
+//! megabyte, or that all functions are the same code. The number of bytes read is bounded by the
+//! length of the file.
 
 use crate::AnalysisError;
 use object::{Object, ObjectSection, ObjectSymbol};
 
-/// Maximum number of bytes read, as a multiple of the file's length. Images from a linker need less than one.
+/// Maximum number of bytes read, as a multiple of the file's length. Images from a linker need less
+/// than one.
 const TIMES: u64 = 8;
 
 /// Bytes that may still be read.

@@ -1,8 +1,9 @@
 //! The call graph of an image, read from its machine code.
 //!
-//! Functions are the symbols of type function. Their code is decoded from start to end, except for data, which the symbols `$d` and
-//! `$t` mark. A branch out of a function is a tail call, for which the caller's frame is kept in the bound. A call through a pointer
-//! may reach every function whose address occurs in the image: in a word of the data, or composed by two instructions.
+//! Functions are the symbols of type function. Their code is decoded from start to end, except for
+//! data, which the symbols `$d` and `$t` mark. A branch out of a function is a tail call, for which
+//! the caller's frame is kept in the bound. A call through a pointer may reach every function whose
+//! address occurs in the image: in a word of the data, or composed by two instructions.
 
 use crate::AnalysisError;
 use crate::budget::{self, Budget};
@@ -23,9 +24,11 @@ const LONGEST_NAME: usize = 1024;
 pub struct Function {
     /// Length of its code, bytes; 0 if the symbol has none, which means up to the next function.
     pub length_bytes: u32,
-    /// Its names, without the compiler's hashes; several where functions of the same code share it.
+    /// Its names, without the compiler's hashes; several where functions of the same code share
+    /// it.
     pub names: BTreeSet<String>,
-    /// Stack size given by the compiler, bytes; `None` for code that was not compiled with this image.
+    /// Stack size given by the compiler, bytes; `None` for code that was not compiled with this
+    /// image.
     pub stated_bytes: Option<u32>,
     /// Sum of the stack use of its instructions, bytes.
     pub counted_bytes: u32,
@@ -220,7 +223,8 @@ fn address_of(address: u64) -> Result<u32, AnalysisError> {
     u32::try_from(address).map_err(|_| AnalysisError::Address(address))
 }
 
-/// A name without the compiler's hashes; a few bytes of a mangled one may stand for megabytes, which are cut off.
+/// A name without the compiler's hashes; a few bytes of a mangled one may stand for megabytes,
+/// which are cut off.
 fn demangled(name: &str) -> String {
     struct Short(String);
     impl std::fmt::Write for Short {

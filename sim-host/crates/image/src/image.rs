@@ -94,7 +94,8 @@ impl Image {
         })
     }
 
-    /// Address of the function or variable with the given linker name; `None` if the image has none.
+    /// Address of the function or variable with the given linker name; `None` if the image has
+    /// none.
     pub fn address_of(&self, name: &str) -> Option<u32> {
         let file = object::File::parse(&*self.bytes).ok()?;
         let symbol = file.symbols().find(|s| s.name() == Ok(name))?;

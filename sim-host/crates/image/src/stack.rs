@@ -1,18 +1,22 @@
 //! Worst-case stack.
 //!
-//! All code shares one stack. Code of each priority may be preempted at its deepest point by code of the next priority, and the core
-//! saves its registers at each preemption. The sum over the priorities is an upper bound of the stack.
+//! All code shares one stack. Code of each priority may be preempted at its deepest point by code
+//! of the next priority, and the core saves its registers at each preemption. The sum over the
+//! priorities is an upper bound of the stack.
 //!
 //! Limits of the method:
-//! * The frame of a function is the compiler's stack size (`-Zemit-stack-sizes`), or the sum over its instructions if that is
-//!   greater. A function without a stack size (assembly, compiler built-ins) has that sum.
-//! * A path through the call graph may be impossible in a run, and the caller's frame is counted in a tail call: the bound may be
-//!   too high.
-//! * A call through a pointer is assumed to reach the deepest of all functions whose address occurs in the image. Addresses that
-//!   are computed by arithmetic would be missed; neither the compiler nor this project computes any.
-//! * Recursion, and code with unknown stack use, have no bound: they are reported as problems, and the proof fails.
-//! * An exception does not preempt one of the same priority, which is a property of the core. The firmware must have the given
-//!   priorities.
+//! * The frame of a function is the compiler's stack size (`-Zemit-stack-sizes`), or the sum over
+//!   its instructions if that is greater. A function without a stack size (assembly, compiler
+//!   built-ins) has that sum.
+//! * A path through the call graph may be impossible in a run, and the caller's frame is counted in
+//!   a tail call: the bound may be too high.
+//! * A call through a pointer is assumed to reach the deepest of all functions whose address occurs
+//!   in the image. Addresses that are computed by arithmetic would be missed; neither the compiler
+//!   nor this project computes any.
+//! * Recursion, and code with unknown stack use, have no bound: they are reported as problems, and
+//!   the proof fails.
+//! * An exception does not preempt one of the same priority, which is a property of the core. The
+//!   firmware must have the given priorities.
 
 use crate::AnalysisError;
 use crate::budget;
@@ -21,8 +25,8 @@ use crate::memory::address_of;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// Exception frame with the floating-point unit in use: 8 core registers, 16 floating-point registers, status and a reserved word,
-/// also with lazy stacking (Arm DDI 0403, B1.5.7).
+/// Exception frame with the floating-point unit in use: 8 core registers, 16 floating-point
+/// registers, status and a reserved word, also with lazy stacking (Arm DDI 0403, B1.5.7).
 const EXCEPTION_FRAME_BYTES: u32 = 4 * (8 + 18);
 /// Maximum padding that aligns the stack pointer to 8 bytes.
 const ALIGNMENT_BYTES: u32 = 4;
@@ -76,7 +80,8 @@ impl Stack {
     /// Analyses an image whose code runs at the given priorities, in rising order.
     ///
     /// # Errors
-    /// If it is damaged, was compiled without stack sizes, or lacks a symbol that every image of the firmware has.
+    /// If it is damaged, was compiled without stack sizes, or lacks a symbol that every image of
+    /// the firmware has.
     pub fn analyse(bytes: &[u8], priorities: &[Priority]) -> Result<Self, AnalysisError> {
         let graph = CallGraph::read(bytes)?;
         let file = budget::parse(bytes)?;
@@ -204,7 +209,8 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Bytes of stack below the caller. Iterative, because the depth of a recursion would depend on the image.
+    /// Bytes of stack below the caller. Iterative, because the depth of a recursion would depend on
+    /// the image.
     fn deepest(&mut self, entry: Callee) -> u32 {
         if let Some(Some(known)) = self.known.get(&entry) {
             return known.bytes;

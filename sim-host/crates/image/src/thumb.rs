@@ -30,7 +30,8 @@ pub enum Effect {
     HighHalf(u32, u32),
 }
 
-/// Decodes the instruction at `address`, whose first half-words are `first` and `second`: its length, bytes, and its effect.
+/// Decodes the instruction at `address`, whose first half-words are `first` and `second`: its
+/// length, bytes, and its effect.
 pub fn decode(address: u32, first: u16, second: u16) -> (u32, Effect) {
     let first = u32::from(first);
     // 0b11101, 0b11110 and 0b11111 begin an instruction of two half-words.

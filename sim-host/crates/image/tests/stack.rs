@@ -11,8 +11,9 @@ use object::{
 type Code<'a> = (&'a str, u64, &'a [u16], Option<u8>);
 
 const RETURN: u16 = 0x4770;
-/// `Reset` takes 8 bytes and calls `deep` (24 bytes), the control task 16 and calls through a pointer, which can only be to
-/// `pointed` (40 bytes). A word between two functions is data and would be a PUSH.
+/// `Reset` takes 8 bytes and calls `deep` (24 bytes), the control task 16 and calls through a
+/// pointer, which can only be to `pointed` (40 bytes). A word between two functions is data and
+/// would be a PUSH.
 const CODE: [Code; 8] = [
     // push {r7, lr}; bl 0x110; udf
     ("Reset", 0x100, &[0xB580, 0xF000, 0xF805, 0xDE00], Some(8)),

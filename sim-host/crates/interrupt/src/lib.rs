@@ -1,8 +1,9 @@
 #![doc = include_str!("../README.md")]
 //!
-//! A program's signal handler calls [`request`]. Every long loop calls [`check`], which leaves it by unwinding the stack; [`catch`]
-//! ends the unwinding and returns an error. The caller keeps the results that were complete before. Therefore no function between the
-//! loop and the caller needs an error for the interruption.
+//! A program's signal handler calls [`request`]. Every long loop calls [`check`], which leaves it
+//! by unwinding the stack; [`catch`] ends the unwinding and returns an error. The caller keeps the
+//! results that were complete before. Therefore no function between the loop and the caller needs
+//! an error for the interruption.
 
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -33,7 +33,8 @@ impl Comparison {
 pub enum Depth {
     /// All.
     Bytes,
-    /// Mode, faults, voltages and speed limit: for an ECU without frame checks, which has no warnings.
+    /// Mode, faults, voltages and speed limit: for an ECU without frame checks, which has no
+    /// warnings.
     Commands,
 }
 

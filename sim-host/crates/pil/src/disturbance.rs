@@ -12,8 +12,8 @@ pub struct DutyCodes {
     pub captured: u16,
 }
 
-/// A disturbance between vehicle and ECU; by default none. In each PWM period the functions are called once and in this order. A
-/// frame is `None` if none was sent.
+/// A disturbance between vehicle and ECU; by default none. In each PWM period the functions are
+/// called once and in this order. A frame is `None` if none was sent.
 pub trait Disturbance {
     /// The actuator frame that the vehicle receives.
     fn actuator_frame(&mut self, sent: Option<FrameBytes>) -> Option<FrameBytes> {

@@ -17,7 +17,8 @@ const CLOCK_HZ: u32 = 25_000_000;
 
 /// An ECU in the loop.
 pub trait Ecu {
-    /// One PWM period: `answer` takes the ECU's packet and returns the inputs of its pins at the end of the period.
+    /// One PWM period: `answer` takes the ECU's packet and returns the inputs of its pins at the
+    /// end of the period.
     ///
     /// # Errors
     /// If the ECU does not answer.
@@ -28,8 +29,9 @@ fn counts_per_tick<T: Real>(scenario: &Scenario<T>) -> u32 {
     (f64::from(CLOCK_HZ) / scenario.run.control_rate_hz.to_f64()) as u32
 }
 
-/// Model in the loop: controller and gate are called directly, in one channel and one thread, without the ECU's tasks and without
-/// checks of the sensor frames. It verifies that tasks, channels and frames do not change the commands.
+/// Model in the loop: controller and gate are called directly, in one channel and one thread,
+/// without the ECU's tasks and without checks of the sensor frames. It verifies that tasks,
+/// channels and frames do not change the commands.
 pub struct Model<T> {
     controller: Controller<T>,
     supervisor: Supervisor<T>,
@@ -162,7 +164,8 @@ impl Processor {
         }
     }
 
-    /// Counts of the PWM task (the maximum of one period) and of the control task, one pair per control tick.
+    /// Counts of the PWM task (the maximum of one period) and of the control task, one pair per
+    /// control tick.
     pub fn costs(&self) -> &[(u16, u16)] {
         &self.costs
     }

@@ -1,10 +1,14 @@
 //! Equivalence of firmware and host, on four levels.
 //!
-//! Two correct simulations of a chaotic system diverge, so a single tolerance over a whole run is not a valid test.
+//! Two correct simulations of a chaotic system diverge, so a single tolerance over a whole run is
+//! not a valid test.
 //! 1. *Bits*: the host's f32 run equals the firmware's in every state word and every duty code.
-//! 2. *One step*: from each of the firmware's states, the host's f64 step agrees within the rounding of f32.
-//! 3. *Horizon*: free f32 and f64 runs diverge at the time predicted from the Lyapunov exponent; on a periodic orbit they do not.
-//! 4. *Invariants*: exponent, period, bounds and Poincaré set agree within their statistical errors.
+//! 2. *One step*: from each of the firmware's states, the host's f64 step agrees within the
+//!    rounding of f32.
+//! 3. *Horizon*: free f32 and f64 runs diverge at the time predicted from the Lyapunov exponent; on
+//!    a periodic orbit they do not.
+//! 4. *Invariants*: exponent, period, bounds and Poincaré set agree within their statistical
+//!    errors.
 
 use dynamics::lyapunov::Exponent;
 use dynamics::period::yaw_rate_maxima;
@@ -29,7 +33,8 @@ pub struct Bits {
     pub first: Option<String>,
 }
 
-/// Compares every state word, friction mode and duty code of two f32 runs. NaN equals NaN, because its sign depends on the machine.
+/// Compares every state word, friction mode and duty code of two f32 runs. NaN equals NaN, because
+/// its sign depends on the machine.
 pub fn bits(firmware: &Trace, host: &Trace) -> Bits {
     let mut bits = Bits {
         compared: 0,
@@ -84,7 +89,8 @@ impl Bits {
 /// Level 2: the defect of every step.
 #[derive(Debug, Clone)]
 pub struct OneStep {
-    /// For each step, the time (s) and the ratio of defect to bound, the greatest of the four components.
+    /// For each step, the time (s) and the ratio of defect to bound, the greatest of the four
+    /// components.
     pub ratios: Vec<(f64, f64)>,
     /// Root mean square of the defects, each relative to the component's range in the run.
     pub relative_rms: f64,
@@ -105,7 +111,8 @@ fn nan_max(a: f64, b: f64) -> f64 {
     if b.is_nan() || b > a { b } else { a }
 }
 
-/// Computes one step in f64 from each of the firmware's states, with a bound on the rounding of the same step in f32.
+/// Computes one step in f64 from each of the firmware's states, with a bound on the rounding of the
+/// same step in f32.
 ///
 /// # Errors
 /// If the scenario is invalid.
@@ -145,7 +152,8 @@ fn sizes(trace: &Trace) -> [f64; 4] {
     })
 }
 
-/// Level 3: distance of two free runs over time (s), the greatest of the components relative to their ranges.
+/// Level 3: distance of two free runs over time (s), the greatest of the components relative to
+/// their ranges.
 pub fn divergence(a: &Trace, b: &Trace) -> Vec<(f64, f64)> {
     let sizes = sizes(a);
     let distance = |(k, (p, q)): (usize, (&State<f64>, &State<f64>))| {
@@ -160,8 +168,9 @@ pub fn divergence(a: &Trace, b: &Trace) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// The time (s) at which runs diverge: the first at which the geometric mean of their distance over a cycle of `cycle_s` exceeds
-/// [`PARTED`]. Within a cycle the distance varies by some e-folds, which the exponent does not describe.
+/// The time (s) at which runs diverge: the first at which the geometric mean of their distance over
+/// a cycle of `cycle_s` exceeds [`PARTED`]. Within a cycle the distance varies by some e-folds,
+/// which the exponent does not describe.
 pub fn parted_at_s(divergence: &[(f64, f64)], cycle_s: f64) -> Option<f64> {
     let step_s = divergence.first()?.0;
     let cycle = (cycle_s / step_s).round().max(1.0) as usize;
@@ -186,10 +195,12 @@ pub fn parted_at_s(divergence: &[(f64, f64)], cycle_s: f64) -> Option<f64> {
 
 /// Predicted time at which free f32 and f64 runs diverge: least, expected and greatest, s.
 ///
-/// Each step adds an error of relative size e in a random direction, and errors grow with the exponent L. After about 1/L
-/// seconds the sum has the size e/sqrt(2 L h) times exp(L t), where h is the step. Over a time T the logarithm of the growth
-/// scatters by sqrt(D T), with D = (standard error)^2 times the length of the trajectory of the exponent. The interval is that of
-/// three standard deviations: it ends where the growth, faster or slower by three deviations, reaches [`PARTED`].
+/// Each step adds an error of relative size e in a random direction, and errors grow with the
+/// exponent L. After about 1/L seconds the sum has the size e/sqrt(2 L h) times exp(L t), where h
+/// is the step. Over a time T the logarithm of the growth scatters by sqrt(D T), with D = (standard
+/// error)^2 times the length of the trajectory of the exponent. The interval is that of
+/// three standard deviations: it ends where the growth, faster or slower by three deviations,
+/// reaches [`PARTED`].
 pub fn horizon_s(exponent: &Exponent, relative_rms: f64, step_s: f64) -> [f64; 3] {
     let rate = exponent.per_s;
     let start = relative_rms / (2.0 * rate * step_s).sqrt();
@@ -202,8 +213,9 @@ pub fn horizon_s(exponent: &Exponent, relative_rms: f64, step_s: f64) -> [f64; 3
     })
 }
 
-/// Level 4: distance of the yaw rate's extremes in the firmware's run from those of equally long segments of the host's long run,
-/// relative to the tolerance: four standard deviations of the segments, plus 1e-4 of the range for rounding.
+/// Level 4: distance of the yaw rate's extremes in the firmware's run from those of equally long
+/// segments of the host's long run, relative to the tolerance: four standard deviations of the
+/// segments, plus 1e-4 of the range for rounding.
 pub fn bounds_distance(firmware: &Trace, from: usize, host: &Trace, host_from: usize) -> f64 {
     let length = firmware.states.len() - from;
     let (low, high) = host.range(YAW_RATE, host_from);
@@ -227,8 +239,9 @@ fn distance(value: f64, sample: &[f64], range: f64) -> f64 {
     (value - mean).abs() / (4.0 * variance.sqrt() + 1e-4 * range)
 }
 
-/// Level 4: distance of the distributions of the yaw rate's maxima (two-sample Kolmogorov-Smirnov statistic), and its critical value
-/// at a significance of 0.1 %. For chaotic trajectories, whose maxima are almost independent.
+/// Level 4: distance of the distributions of the yaw rate's maxima (two-sample Kolmogorov-Smirnov
+/// statistic), and its critical value at a significance of 0.1 %. For chaotic trajectories, whose
+/// maxima are almost independent.
 pub fn poincare_distance(
     firmware: &Trace,
     from: usize,
@@ -254,8 +267,8 @@ pub fn poincare_distance(
     (apart.fold(0.0, nan_max), 1.949 * ((n + m) / (n * m)).sqrt())
 }
 
-/// Level 4: the greatest distance of a maximum of the firmware's yaw rate from the nearest of the host's, relative to the yaw rate's
-/// range. For periodic orbits, whose maxima are a few points.
+/// Level 4: the greatest distance of a maximum of the firmware's yaw rate from the nearest of the
+/// host's, relative to the yaw rate's range. For periodic orbits, whose maxima are a few points.
 pub fn poincare_points_distance(
     firmware: &Trace,
     from: usize,

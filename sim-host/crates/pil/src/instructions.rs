@@ -35,8 +35,9 @@ impl Instructions {
         }
     }
 
-    /// Of a run in the loop, from the counts of the PWM task (the maximum of one period) and of the control task, one pair per control
-    /// tick. All timers of the machine must have their nominal clock.
+    /// Of a run in the loop, from the counts of the PWM task (the maximum of one period) and of the
+    /// control task, one pair per control tick. All timers of the machine must have their
+    /// nominal clock.
     pub fn in_loop<T: Real>(
         costs: &[(u16, u16)],
         scenario: &Scenario<T>,

@@ -1,7 +1,8 @@
 //! Manoeuvres as files: driver, wheel speed and sensors.
 //!
-//! A manoeuvre's file is a configuration (a preset and the parameters that differ from it) with an additional table `[manoeuvre]`. The
-//! configuration gives the dither's waveform, frequency and start; the ECU chooses its amplitude.
+//! A manoeuvre's file is a configuration (a preset and the parameters that differ from it) with an
+//! additional table `[manoeuvre]`. The configuration gives the dither's waveform, frequency and
+//! start; the ECU chooses its amplitude.
 
 use super::profile::{InvalidProfile, Profile};
 use super::sensor::SensorSettings;
@@ -18,7 +19,8 @@ use toml::{Table, Value};
 const TABLE: &str = "manoeuvre";
 /// Keys of the configuration that the manoeuvre's profiles replace.
 const OWN: [(&str, &str); 2] = [("run", "wheel_speed_rpm"), ("steering", "motor_current_a")];
-/// Ranges of the wheel speed (rpm) and the current request (A), equal to those of the scenario's parameters.
+/// Ranges of the wheel speed (rpm) and the current request (A), equal to those of the scenario's
+/// parameters.
 pub(super) const SPEED_RANGE_RPM: (f64, f64) = (1.0, 1e5);
 const CURRENT_RANGE_A: (f64, f64) = (-1000.0, 1000.0);
 
@@ -82,8 +84,9 @@ pub struct Manoeuvre {
     pub current_request_a: Profile,
     /// A sine added to it.
     pub current_request_sine: Option<RequestSine>,
-    /// Greatest rate of change of the wheel speed, rpm/s, up to 1e6, for a vehicle that obeys the wheel speed limit of the ECU; it
-    /// follows a steeper profile with a lag. With 0 (the default) the vehicle follows its profile and ignores the limit.
+    /// Greatest rate of change of the wheel speed, rpm/s, up to 1e6, for a vehicle that obeys the
+    /// wheel speed limit of the ECU; it follows a steeper profile with a lag. With 0 (the
+    /// default) the vehicle follows its profile and ignores the limit.
     #[serde(default)]
     pub obey_speed_limit_rpm_per_s: f64,
     /// Errors of the sensors.
@@ -203,7 +206,8 @@ pub enum ManoeuvreError {
     Invalid(#[from] InvalidManoeuvre),
 }
 
-/// Reads a manoeuvre's file: the scenario at the manoeuvre's start, and the manoeuvre, both validated.
+/// Reads a manoeuvre's file: the scenario at the manoeuvre's start, and the manoeuvre, both
+/// validated.
 ///
 /// # Errors
 /// If the file cannot be read, has an unknown or missing key, or a number is out of range.

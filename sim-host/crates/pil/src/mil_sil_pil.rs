@@ -1,4 +1,5 @@
-//! A manoeuvre as MIL, SIL and PIL (model, software and processor in the loop), and a comparison of their commands.
+//! A manoeuvre as MIL, SIL and PIL (model, software and processor in the loop), and a comparison of
+//! their commands.
 
 use super::closed_loop::{Exchange, Run, run};
 use super::comparison::{Comparison, Depth, compare};
@@ -61,7 +62,8 @@ pub struct ProcessorRun {
     pub run: Run,
     /// Elapsed time.
     pub elapsed: Duration,
-    /// Counts of the PWM task (the maximum of one period) and of the control task, one pair per control tick.
+    /// Counts of the PWM task (the maximum of one period) and of the control task, one pair per
+    /// control tick.
     pub costs: Vec<(u16, u16)>,
     /// The firmware's log.
     pub log: Vec<String>,
@@ -105,7 +107,8 @@ impl MilSilPil {
     }
 }
 
-/// Runs a manoeuvre as MIL, SIL and PIL. `on_period` is called after each PWM period of the firmware's run.
+/// Runs a manoeuvre as MIL, SIL and PIL. `on_period` is called after each PWM period of the
+/// firmware's run.
 ///
 /// # Errors
 /// If the manoeuvre cannot be run.

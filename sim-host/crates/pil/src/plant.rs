@@ -27,9 +27,10 @@ pub enum InvalidPlant {
 
 /// The vehicle on its manoeuvre, in f64, stepped at the PWM rate.
 ///
-/// The input of the servo is the mean voltage of each period, without the carrier's ripple. Its slow part drives the motor current
-/// through the winding's resistance (back-EMF and inductance are neglected, as in the paper's constant current). The remainder is
-/// the dither, which is added to the argument of the nonlinearities and held over the period.
+/// The input of the servo is the mean voltage of each period, without the carrier's ripple. Its
+/// slow part drives the motor current through the winding's resistance (back-EMF and inductance are
+/// neglected, as in the paper's constant current). The remainder is the dither, which is added to
+/// the argument of the nonlinearities and held over the period.
 #[derive(Debug, Clone)]
 pub struct Plant {
     scenario: Scenario<f64>,
@@ -48,8 +49,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// The vehicle at the start of a manoeuvre: in the scenario's initial state, the servo settled at the voltage of the
-    /// manoeuvre's initial request.
+    /// The vehicle at the start of a manoeuvre: in the scenario's initial state, the servo settled
+    /// at the voltage of the manoeuvre's initial request.
     ///
     /// # Errors
     /// If the scenario or the manoeuvre is invalid, or the servo's winding has no resistance.
@@ -118,7 +119,8 @@ impl Plant {
             .set_wheel_speed_rpm(vehicle, self.wheel_speed_rpm);
     }
 
-    /// Sets the ECU's wheel speed limit, rpm; the manoeuvre determines whether the vehicle obeys it.
+    /// Sets the ECU's wheel speed limit, rpm; the manoeuvre determines whether the vehicle obeys
+    /// it.
     pub fn set_wheel_speed_limit_rpm(&mut self, limit_rpm: f64) {
         self.wheel_speed_limit_rpm = limit_rpm.max(SPEED_RANGE_RPM.0);
     }

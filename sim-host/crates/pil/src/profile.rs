@@ -3,8 +3,8 @@
 use dynamics::words::Short;
 use serde::Deserialize;
 
-/// Linear interpolation between knots `[time (s), value]`; constant before the first and after the last. Two knots at the same time
-/// are a step from the first value to the second.
+/// Linear interpolation between knots `[time (s), value]`; constant before the first and after the
+/// last. Two knots at the same time are a step from the first value to the second.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(transparent)]
 pub struct Profile {

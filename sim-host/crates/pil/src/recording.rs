@@ -1,7 +1,9 @@
-//! A recorded run: the scenario and all packets between ECU and vehicle, for replay without an emulator.
+//! A recorded run: the scenario and all packets between ECU and vehicle, for replay without an
+//! emulator.
 //!
-//! The file contains a magic number, the length of the ECU's scenario as TOML, the scenario, the number of PWM periods, two packets
-//! per period, and a CRC-32 of all preceding bytes. Numbers are little-endian.
+//! The file contains a magic number, the length of the ECU's scenario as TOML, the scenario, the
+//! number of PWM periods, two packets per period, and a CRC-32 of all preceding bytes. Numbers are
+//! little-endian.
 
 use super::closed_loop::Exchange;
 use super::ecu::{Ecu, Software};

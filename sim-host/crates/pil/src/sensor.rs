@@ -63,7 +63,8 @@ pub struct SensorSettings {
     pub resolution: PerSensor,
     /// Standard deviation of the white Gaussian noise before rounding.
     pub noise: PerSensor,
-    /// Delay of the whole measurement, control ticks, up to 100. The first measurement is repeated until then.
+    /// Delay of the whole measurement, control ticks, up to 100. The first measurement is repeated
+    /// until then.
     pub delay_ticks: usize,
     /// Seed of the noise.
     pub seed: u64,
@@ -128,8 +129,8 @@ impl Sensors {
         }
     }
 
-    /// The measurement that the ECU receives at a control tick with the true values `truth`. The driver's request has the same delay,
-    /// but neither noise nor rounding.
+    /// The measurement that the ECU receives at a control tick with the true values `truth`. The
+    /// driver's request has the same delay, but neither noise nor rounding.
     pub fn sample(&mut self, truth: &Measurement<f64>) -> Measurement<f32> {
         let now = self.measure(truth).map(&to_f32);
         if self.late.is_empty() {
@@ -144,7 +145,8 @@ impl Sensors {
             resolution, noise, ..
         } = self.settings;
         let mut sense = |value, noise, resolution| {
-            // Drawn for ideal sensors too, so that the noise of one sensor does not depend on that of another.
+            // Drawn for ideal sensors too, so that the noise of one sensor does not depend on that
+            // of another.
             let normal: f64 = StandardNormal.sample(&mut self.generator);
             rounded(value + noise * normal, resolution)
         };

@@ -4,8 +4,9 @@ use shared_model::parameter::{Field, ParameterSet};
 
 /// Parameters of the separation of torque and dither. The paper gives none; these are assumptions.
 ///
-/// A low corner frequency preserves the square wave, a high one reduces leakage of the driver's request into the dither. Values at a
-/// PWM rate of 10 kHz (a test checks gains, torque shares and leakage of the default):
+/// A low corner frequency preserves the square wave, a high one reduces leakage of the driver's
+/// request into the dither. Values at a PWM rate of 10 kHz (a test checks gains, torque shares and
+/// leakage of the default):
 ///
 /// | corner, rad/s | 40 | 100 (default) | 200 |
 /// |---|---|---|---|
@@ -18,15 +19,17 @@ use shared_model::parameter::{Field, ParameterSet};
 /// | the same: sine of 1.0 V | +0.01 % | +0.07 % | +0.28 % |
 /// | leakage of a ramp of 10 A/s (3 V/s) into the dither | 75 mV | 30 mV | 15 mV |
 ///
-/// The peak-to-peak value is that of the smoothed yaw rate, relative to a corner of 1 rad/s. A step leaks completely at any corner and
-/// decays with its time constant. At the 1 rad/V of a square dither, a step of 3 V is an angle that only the limit keeps small.
+/// The peak-to-peak value is that of the smoothed yaw rate, relative to a corner of 1 rad/s. A step
+/// leaks completely at any corner and decays with its time constant. At the 1 rad/V of a square
+/// dither, a step of 3 V is an angle that only the limit keeps small.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ServoFilter {
     /// Corner of the low-pass for the torque and of the high-pass for the dither, rad/s.
     pub corner_rad_per_s: f64,
-    /// Limit of the angle that the dither adds to the argument of the nonlinearities, rad. A step of the motor's voltage passes the
-    /// high-pass completely, and would be an angle of several rad without the limit.
+    /// Limit of the angle that the dither adds to the argument of the nonlinearities, rad. A step
+    /// of the motor's voltage passes the high-pass completely, and would be an angle of
+    /// several rad without the limit.
     pub dither_limit_rad: f64,
 }
 
@@ -66,12 +69,13 @@ pub struct Parts {
     pub dither_v: f64,
 }
 
-/// A first-order low-pass and its complement, exact for a voltage that is constant over each period.
+/// A first-order low-pass and its complement, exact for a voltage that is constant over each
+/// period.
 #[derive(Debug, Clone, Copy)]
 pub struct Separation {
     voltage_v: f64,
-    /// Output of the high-pass at the end of the period, V. Stored instead of the low-pass's output, so that it decays to zero
-    /// under a constant voltage, without a rounding residue.
+    /// Output of the high-pass at the end of the period, V. Stored instead of the low-pass's
+    /// output, so that it decays to zero under a constant voltage, without a rounding residue.
     dither_v: f64,
     /// Decay factor over a period.
     decay: f64,

@@ -1,7 +1,8 @@
 //! The vehicle as the node that answers the ECU once per PWM period: plant, sensors and frames.
 //!
-//! An ECU starts with a neutral servo and slews to the driver's request. During this lead-in the vehicle is held in its initial
-//! state with its sensors on, so that the slew is complete when the manoeuvre begins.
+//! An ECU starts with a neutral servo and slews to the driver's request. During this lead-in the
+//! vehicle is held in its initial state with its sensors on, so that the slew is complete when the
+//! manoeuvre begins.
 
 use super::disturbance::{Disturbance, Undisturbed};
 use super::manoeuvre::Manoeuvre;
@@ -73,8 +74,8 @@ impl VehicleNode {
         })
     }
 
-    /// Takes the ECU's packet for a period and integrates the plant over it. Answers with the duty on the servo's pin and, at a
-    /// control tick, a sensor frame.
+    /// Takes the ECU's packet for a period and integrates the plant over it. Answers with the duty
+    /// on the servo's pin and, at a control tick, a sensor frame.
     pub fn answer(&mut self, from_ecu: &Packet) -> Packet {
         self.answer_through(&mut Undisturbed, from_ecu)
     }

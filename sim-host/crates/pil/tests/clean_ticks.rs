@@ -1,5 +1,6 @@
-//! No false alarm: the ECU's program in the loop on clean drives, and the gate finds nothing. The test in every run takes a
-//! million control ticks; ten million take minutes: `cargo test --release -p sim-host --test clean_ticks -- --ignored`.
+//! No false alarm: the ECU's program in the loop on clean drives, and the gate finds nothing. The
+//! test in every run takes a million control ticks; ten million take minutes: `cargo test --release
+//! -p sim-host --test clean_ticks -- --ignored`.
 
 use pil::ecu::{Ecu, Software};
 use pil::manoeuvre::{Manoeuvre, load};
@@ -13,7 +14,8 @@ use std::path::Path;
 
 const WAVEFORMS: [Waveform; 3] = [Waveform::None, Waveform::Square, Waveform::Sine];
 
-/// The files' manoeuvres, and constant speeds from rest to the fastest chaos, each waveform, requests to both sides.
+/// The files' manoeuvres, and constant speeds from rest to the fastest chaos, each waveform,
+/// requests to both sides.
 fn drives() -> Vec<(Scenario<f64>, Manoeuvre)> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/manoeuvres");
     let files = folder.read_dir().expect("the examples are there");

@@ -1,4 +1,5 @@
-//! The loop closed on the host: what the dither does to the vehicle when an ECU that only sees frames puts it out as duty.
+//! The loop closed on the host: what the dither does to the vehicle when an ECU that only sees
+//! frames puts it out as duty.
 
 use dynamics::extrema::Extrema;
 use dynamics::period::{Period, period_of_maxima};

@@ -1,4 +1,5 @@
-//! The comparison of f32 and f64, on host runs of both: it passes where it should, and fails where it should.
+//! The comparison of f32 and f64, on host runs of both: it passes where it should, and fails where
+//! it should.
 
 use dynamics::lyapunov::largest;
 use dynamics::period::mean_cycle_s;

@@ -87,7 +87,8 @@ fn every_undetected_fault_has_a_waiver() {
     assert_eq!(waivers::rationale(&Injection::Loop(nan())), None);
 }
 
-/// The program with interrupts that can fail equals the program, and nothing is detected without a fault.
+/// The program with interrupts that can fail equals the program, and nothing is detected without a
+/// fault.
 #[test]
 fn nothing_is_detected_without_a_fault() {
     let (mut scenario, manoeuvre) = manoeuvre("low resolution and noise");

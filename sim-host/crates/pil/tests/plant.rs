@@ -50,7 +50,8 @@ fn distance(a: &[State<f64>], b: &[State<f64>]) -> f64 {
     apart.fold(0.0, f64::max)
 }
 
-/// A current that the PWM meets in whole counts: nothing is left of the servo, in both friction laws, with any waveform.
+/// A current that the PWM meets in whole counts: nothing is left of the servo, in both friction
+/// laws, with any waveform.
 #[test]
 fn constant_duty_is_the_undithered_model() {
     for preset in [Preset::Reconstruction, Preset::Printed] {
@@ -70,8 +71,9 @@ fn constant_duty_is_the_undithered_model() {
     }
 }
 
-/// The paper's 10 A lie between two counts: the motion differs from the model's no more than that of a model with the duty's own
-/// current does. The plant's current comes from 10 A to that one within the filter's settling time.
+/// The paper's 10 A lie between two counts: the motion differs from the model's no more than that
+/// of a model with the duty's own current does. The plant's current comes from 10 A to that one
+/// within the filter's settling time.
 #[test]
 fn the_paper_current_is_met_within_the_quantisation() {
     let scenario = Scenario::reconstruction();
@@ -90,9 +92,10 @@ fn the_paper_current_is_met_within_the_quantisation() {
     );
 }
 
-/// The plant under a dithered duty, settled, against the averaged model at the amplitude that the duty codes have: the swing of
-/// the smoothed yaw rate, within what the signal at the PWM's rate makes of it without servo (`docs/physics.md`: 0.4 % for the
-/// square wave, 0.06 % for the sine) and 0.1 % for the servo's filter.
+/// The plant under a dithered duty, settled, against the averaged model at the amplitude that the
+/// duty codes have: the swing of the smoothed yaw rate, within what the signal at the PWM's rate
+/// makes of it without servo (`docs/physics.md`: 0.4 % for the square wave, 0.06 % for the sine)
+/// and 0.1 % for the servo's filter.
 #[test]
 fn dithered_duty_is_the_averaged_model() {
     for (waveform, amplitude_v, tolerance) in

@@ -22,7 +22,8 @@ const TICK: i32 = 7;
 const LABEL_GAP: i32 = 8;
 const FEW_DOTS: usize = 1500;
 
-/// Height of a stack of axes of the given height, only the last of which name their horizontal axis.
+/// Height of a stack of axes of the given height, only the last of which name their horizontal
+/// axis.
 pub fn stack_height(panels: usize, height: i32) -> i32 {
     (CAPTION + height + TICKS) * panels as i32 + (TICKS_AND_NAME - TICKS)
 }
@@ -57,8 +58,8 @@ pub struct Axes<'a> {
 }
 
 impl<'a> Axes<'a> {
-    /// Axes and grid on the area; above them a caption, shortened if it must be, and at the right end
-    /// a fainter remark.
+    /// Axes and grid on the area; above them a caption, shortened if it must be, and at the right
+    /// end a fainter remark.
     pub fn new(area: &Area<'a>, (caption, remark): (&str, &str), x: Axis, y: Axis) -> Self {
         let below = if x.name.is_empty() {
             TICKS
@@ -127,7 +128,8 @@ impl<'a> Axes<'a> {
         (self.across(point.0), self.down(point.1))
     }
 
-    /// Width and height of the axes over their extents: in their values, or decades on a logarithmic axis.
+    /// Width and height of the axes over their extents: in their values, or decades on a
+    /// logarithmic axis.
     pub fn units_per_place(&self) -> Point {
         let extent = |axis: &Axis| axis.ends().1 - axis.ends().0;
         (
@@ -136,7 +138,8 @@ impl<'a> Axes<'a> {
         )
     }
 
-    /// Dots, those in the same pixel once: as small as the line is wide, or twice as large where they are few.
+    /// Dots, those in the same pixel once: as small as the line is wide, or twice as large where
+    /// they are few.
     pub(crate) fn dots(&self, points: &[Point], line: Line) {
         let runs = pixel_runs(points.iter().map(|point| self.place(*point)));
         if runs.is_empty() {

@@ -78,8 +78,9 @@ impl Axis {
         Self::logarithmic(name, 10_f64.powf(low), 10_f64.powf(high), ticks)
     }
 
-    /// A logarithmic axis from `low` to `high`, both greater than 0, with at most about `ticks` ticks: at powers of ten, or
-    /// at 1, 2 and 5 times them where the axis spans less than two decades.
+    /// A logarithmic axis from `low` to `high`, both greater than 0, with at most about `ticks`
+    /// ticks: at powers of ten, or at 1, 2 and 5 times them where the axis spans less than two
+    /// decades.
     pub fn logarithmic(name: &str, low: f64, high: f64, ticks: usize) -> Self {
         let bounded = |value: f64| value.log10().clamp(-MOST_DECADE, MOST_DECADE);
         let from = bounded(low);
@@ -116,7 +117,8 @@ impl Axis {
         }
     }
 
-    /// The quantity that is proportional to length on the axis: the value, or its decimal logarithm.
+    /// The quantity that is proportional to length on the axis: the value, or its decimal
+    /// logarithm.
     pub fn place(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Linear { .. } => value,
@@ -153,7 +155,8 @@ impl Axis {
         ((self.place(value) - low) / (high - low)).clamp(0.0, 1.0)
     }
 
-    /// The unit on the way from `start` at the lower end to `end` at the upper that is nearest to a value.
+    /// The unit on the way from `start` at the lower end to `end` at the upper that is nearest to a
+    /// value.
     pub fn unit(&self, value: f64, (start, end): (i32, i32)) -> i32 {
         start + (self.fraction(value) * f64::from(end - start)).round() as i32
     }
@@ -190,7 +193,8 @@ pub fn bounds(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
         })
 }
 
-/// The least of 1, 2, 5 times a power of ten that is not less than `least`, and the decimals it needs.
+/// The least of 1, 2, 5 times a power of ten that is not less than `least`, and the decimals it
+/// needs.
 fn round_step(least: f64) -> (f64, usize) {
     let exponent = least.log10().floor() as i32;
     let power = 10_f64.powi(exponent);

@@ -210,7 +210,8 @@ impl Area<'_> {
         ));
     }
 
-    /// Vertical strokes with round ends, each a column with its first and last row: a dot where they coincide.
+    /// Vertical strokes with round ends, each a column with its first and last row: a dot where
+    /// they coincide.
     pub(crate) fn strokes(&self, strokes: &[(i32, i32, i32)], line: Line) {
         let mut path = String::new();
         for &(x, from, to) in strokes {

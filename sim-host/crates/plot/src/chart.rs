@@ -16,18 +16,21 @@ pub struct Chart {
     pub panels: Vec<Panel>,
 }
 
-/// One pair of axes and what is drawn between them. What lies beyond axes of a given range is cut off.
+/// One pair of axes and what is drawn between them. What lies beyond axes of a given range is cut
+/// off.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Panel {
     /// Text above the panel; may be empty.
     pub caption: String,
-    /// Horizontal axis. Stacked panels of equal horizontal axes share its range, and the lowest of them names it.
+    /// Horizontal axis. Stacked panels of equal horizontal axes share its range, and the lowest of
+    /// them names it.
     pub x: AxisSpec,
     /// Vertical axis.
     pub y: AxisSpec,
     /// Lines and dots.
     pub series: Vec<Series>,
-    /// Ranges of the horizontal axis with their labels above the panel; every second one is shaded.
+    /// Ranges of the horizontal axis with their labels above the panel; every second one is
+    /// shaded.
     pub regions: Vec<Region>,
     /// Vertical lines with their labels above the panel.
     pub instants: Vec<(f64, String)>,
@@ -40,8 +43,8 @@ pub struct Panel {
 pub struct AxisSpec {
     /// What it shows, with its unit.
     pub name: String,
-    /// Its ends; without any, those of the data with a margin. Ends that an axis cannot have (reversed, not finite, not
-    /// positive on a logarithmic axis) count as none.
+    /// Its ends; without any, those of the data with a margin. Ends that an axis cannot have
+    /// (reversed, not finite, not positive on a logarithmic axis) count as none.
     pub range: Option<(f64, f64)>,
     /// Logarithmic instead of linear; values that are not positive are left out.
     pub logarithmic: bool,
@@ -103,7 +106,8 @@ const MOST_LARGE_DOTS: usize = 3000;
 /// Colours of dots before they repeat.
 const COLOURS: usize = 4;
 
-/// The `n`-th set of dots of a panel, to be seen one by one: a name for the legend, and each dot as a line of one point.
+/// The `n`-th set of dots of a panel, to be seen one by one: a name for the legend, and each dot as
+/// a line of one point.
 pub fn large_dots(label: &str, n: usize, points: Vec<(f64, f64)>) -> Vec<Series> {
     let named = Series {
         label: label.into(),
@@ -126,7 +130,8 @@ pub fn large_dots(label: &str, n: usize, points: Vec<(f64, f64)>) -> Vec<Series>
 /// How points are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {
-    /// Joined by the n-th line style. A line so short that it could not be seen is drawn as a large dot.
+    /// Joined by the n-th line style. A line so short that it could not be seen is drawn as a large
+    /// dot.
     Line(usize),
     /// Small dots, those of the same pixel once. Each such series of a panel has its own colour.
     Dots,
@@ -255,7 +260,8 @@ impl Layout {
 }
 
 impl Panel {
-    /// Points without a caption, a label or ranges: for instance one component of states over another.
+    /// Points without a caption, a label or ranges: for instance one component of states over
+    /// another.
     pub fn of_points(
         (x, y): (impl Into<String>, impl Into<String>),
         points: Vec<(f64, f64)>,
@@ -435,7 +441,8 @@ fn visible_pieces(x: &Axis, y: &Axis, points: &[Point]) -> Vec<Vec<Point>> {
     pieces
 }
 
-/// The part of a straight piece within the ranges of both coordinates (Liang and Barsky's algorithm).
+/// The part of a straight piece within the ranges of both coordinates (Liang and Barsky's
+/// algorithm).
 fn clipped(from: Point, to: Point, x: Point, y: Point) -> Option<(Point, Point)> {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);

@@ -22,7 +22,8 @@ const HEADING_STEP: i32 = 38;
 const LEGEND_STEP: i32 = 36;
 const SAMPLE_WIDTH: i32 = 76;
 
-/// A figure as an SVG document: heading and legend, and below them an area of the given height, on which `paint` draws.
+/// A figure as an SVG document: heading and legend, and below them an area of the given height, on
+/// which `paint` draws.
 pub fn figure(
     heading: &str,
     legend: &[(String, Sample)],

@@ -1,4 +1,5 @@
-//! A matrix of outcomes for a page: rows by columns, each cell with a mark, a short text and a link.
+//! A matrix of outcomes for a page: rows by columns, each cell with a mark, a short text and a
+//! link.
 
 use crate::verdict::Status;
 use maud::{Markup, html};
@@ -66,7 +67,8 @@ impl Mark {
 pub struct Cell {
     /// The outcome.
     pub mark: Mark,
-    /// A figure instead of the mark's word, which then is the beginning of the tooltip; may be empty.
+    /// A figure instead of the mark's word, which then is the beginning of the tooltip; may be
+    /// empty.
     pub text: String,
     /// Tooltip.
     pub title: String,

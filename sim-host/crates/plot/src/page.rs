@@ -29,8 +29,8 @@ pub fn figure(id: &str, svg: &str, caption: &Markup) -> Markup {
     }
 }
 
-/// Light or dark as the reader's system is, always light in print. The status colours have a contrast of at least 7 to 1 with
-/// their text.
+/// Light or dark as the reader's system is, always light in print. The status colours have a
+/// contrast of at least 7 to 1 with their text.
 const STYLE: &str = "
 :root { color-scheme: light dark; --ink: #1a1a1a; --ground: #fff; --faint: #454545; --rule: #d5d5d5; --link: #123f8c;
   --passed: #0f4a1c; --passed-ground: #e0f2e3; --passed-rule: #2c7a3c;

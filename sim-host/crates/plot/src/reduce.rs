@@ -29,8 +29,9 @@ pub fn maxima(points: impl IntoIterator<Item = Point>, buckets: usize) -> Vec<Po
         .collect()
 }
 
-/// The curve with at most `most` points, none of the others further from it than a tolerance: a fifth
-/// of a unit of the picture, or as much as `most` needs. `scale` is units of the picture per unit of the axes.
+/// The curve with at most `most` points, none of the others further from it than a tolerance: a
+/// fifth of a unit of the picture, or as much as `most` needs. `scale` is units of the picture per
+/// unit of the axes.
 pub fn curve(points: impl IntoIterator<Item = Point>, scale: Point, most: usize) -> Vec<Point> {
     let points = finite(points);
     let scaled: Vec<Point> = points

@@ -61,7 +61,8 @@ pub(crate) const DOTS: [Line; 4] = [
     line(Colour(0x7b, 0x50, 0xb6), 3, ""),
 ];
 
-/// Width of a text of the given height in a wide sans-serif font (DejaVu Sans); others are narrower.
+/// Width of a text of the given height in a wide sans-serif font (DejaVu Sans); others are
+/// narrower.
 pub fn text_width(text: &str, height: u32) -> i32 {
     let width: f64 = text.chars().map(character_width).sum();
     (width * f64::from(height)).ceil() as i32

@@ -1,7 +1,8 @@
 //! An image of one's own in QEMU: its size, its log as it runs, and its exit code.
 //!
 //! `cargo xtask firmware`, then
-//! `cargo run --release -p dithersteer-qemu --example own_image -- target/thumbv7em-none-eabihf/firmware/ecu`
+//! `cargo run --release -p dithersteer-qemu --example own_image --
+//! target/thumbv7em-none-eabihf/firmware/ecu`
 
 use image::Image;
 use qemu::Machine;

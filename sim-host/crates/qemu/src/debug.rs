@@ -23,8 +23,8 @@ pub struct Debugged {
 }
 
 impl Debugged {
-    /// Starts an image as [`run::run`] does, with the core stopped before its first instruction. `limit` is the time limit of each
-    /// request.
+    /// Starts an image as [`run::run`] does, with the core stopped before its first instruction.
+    /// `limit` is the time limit of each request.
     ///
     /// # Errors
     /// If the emulator is missing, fails, or does not start in time.
@@ -52,7 +52,8 @@ impl Debugged {
         })
     }
 
-    /// Detaches from the core and waits for the end of the run. Until then the log is in a pipe, which holds some hundred lines.
+    /// Detaches from the core and waits for the end of the run. Until then the log is in a pipe,
+    /// which holds some hundred lines.
     ///
     /// # Errors
     /// As [`run::run`].

@@ -1,8 +1,10 @@
-//! The emulator's process and its children: they are ended together, and their pipes end with the emulator.
+//! The emulator's process and its children: they are ended together, and their pipes end with the
+//! emulator.
 //!
-//! The program called `qemu-system-arm` may be a wrapper whose child is the emulator, or leave a process behind that keeps
-//! its pipes open. It is therefore in a separate process group, which is killed as a whole, and its pipes end when it ends.
-//! The group does not receive the terminal's Ctrl-C; waiting functions here read the flag that Ctrl-C sets.
+//! The program called `qemu-system-arm` may be a wrapper whose child is the emulator, or leave a
+//! process behind that keeps its pipes open. It is therefore in a separate process group, which is
+//! killed as a whole, and its pipes end when it ends. The group does not receive the terminal's
+//! Ctrl-C; waiting functions here read the flag that Ctrl-C sets.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
@@ -26,7 +28,8 @@ pub(crate) struct Emulator {
 }
 
 impl Emulator {
-    /// Starts the emulator in a separate process group. Its standard output and error must be pipes.
+    /// Starts the emulator in a separate process group. Its standard output and error must be
+    /// pipes.
     pub(crate) fn spawn(command: &mut Command) -> io::Result<Self> {
         command.process_group(0);
         end_with_parent(command);
@@ -69,7 +72,8 @@ impl Emulator {
     }
 
     fn end(&mut self) -> io::Result<()> {
-        // Before waiting for the child, so that no other group can have its number. Fails if all have already ended.
+        // Before waiting for the child, so that no other group can have its number. Fails if all
+        // have already ended.
         let _ = kill_process_group(self.group, Signal::KILL);
         self.status = Some(self.child.wait()?);
         self.ended.store(true, Ordering::Release);
@@ -97,7 +101,8 @@ fn end_with_parent(command: &mut Command) {
     }
 }
 
-/// A pipe from the emulator. It ends with the emulator, after its remaining content, even if another process holds its other end.
+/// A pipe from the emulator. It ends with the emulator, after its remaining content, even if
+/// another process holds its other end.
 pub(crate) struct Pipe<P> {
     pipe: P,
     ended: Arc<AtomicBool>,
@@ -127,7 +132,8 @@ impl<P: Read + AsFd> Read for Pipe<P> {
     }
 }
 
-/// Waits at most `limit` until a file can be read or written without waiting; a signal may end the wait sooner.
+/// Waits at most `limit` until a file can be read or written without waiting; a signal may end the
+/// wait sooner.
 pub(crate) fn is_ready(file: &impl AsFd, flags: PollFlags, limit: Duration) -> io::Result<bool> {
     let limit = Timespec {
         tv_sec: limit.as_secs() as i64,
@@ -140,7 +146,8 @@ pub(crate) fn is_ready(file: &impl AsFd, flags: PollFlags, limit: Duration) -> i
     }
 }
 
-/// Reads a stream to its end and returns its first bytes as text: the message of a program that fails.
+/// Reads a stream to its end and returns its first bytes as text: the message of a program that
+/// fails.
 pub(crate) fn first_words(mut stream: impl Read) -> String {
     /// Maximum number of bytes stored.
     const KEPT: usize = 16 * 1024;

@@ -1,16 +1,18 @@
 //! The emulator's gdb stub: stops, reads and changes the core over the remote serial protocol.
 //!
-//! QEMU treats a stopped core as idle (observed in 7.2), and idle time is skipped: at each stop the virtual time advances to the next
-//! timer interrupt, which is then due immediately. Data are unchanged, but a run with many stops has less time between its interrupts.
-//! A stop while the core would be idle has no effect. Protocol: the GDB manual, appendix "GDB Remote Serial Protocol".
+//! QEMU treats a stopped core as idle (observed in 7.2), and idle time is skipped: at each stop the
+//! virtual time advances to the next timer interrupt, which is then due immediately. Data are
+//! unchanged, but a run with many stops has less time between its interrupts. A stop while the core
+//! would be idle has no effect. Protocol: the GDB manual, appendix "GDB Remote Serial Protocol".
 
 use crate::socket::{LONGEST_LINE, Socket, SocketError};
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::time::Duration;
 
-/// Disables interrupts and timers in single steps. Otherwise a step past a breakpoint enters the interrupt that the stop has made
-/// due, and the core returns to the breakpoint without having passed it.
+/// Disables interrupts and timers in single steps. Otherwise a step past a breakpoint enters the
+/// interrupt that the stop has made due, and the core returns to the breakpoint without having
+/// passed it.
 const STEP_ALONE: &str = "Qqemu.sstep=7";
 /// Size of a Thumb breakpoint in the protocol, bytes.
 const THUMB_BREAKPOINT: u32 = 2;
@@ -20,7 +22,8 @@ const THUMB_BREAKPOINT: u32 = 2;
 pub enum Stop {
     /// At a breakpoint.
     Breakpoint,
-    /// The program and the emulator have ended with this exit code, of which the protocol contains the low 8 bits.
+    /// The program and the emulator have ended with this exit code, of which the protocol contains
+    /// the low 8 bits.
     Exited(u8),
 }
 
@@ -40,7 +43,8 @@ pub enum Register {
 }
 
 impl Register {
-    /// Its number in the protocol. The status follows eight registers of an older floating-point unit.
+    /// Its number in the protocol. The status follows eight registers of an older floating-point
+    /// unit.
     fn number(self) -> u8 {
         match self {
             Self::R(index) => index,
@@ -60,8 +64,8 @@ pub struct Gdb {
 }
 
 impl Gdb {
-    /// Connects to the stub at the local socket `path` and stops the core. `limit` is the time limit of the connection and of each
-    /// later request.
+    /// Connects to the stub at the local socket `path` and stops the core. `limit` is the time
+    /// limit of the connection and of each later request.
     ///
     /// # Errors
     /// If the stub does not answer in time.
@@ -71,7 +75,8 @@ impl Gdb {
             socket,
             breakpoints: BTreeSet::new(),
         };
-        // The emulator allows access to single registers only after a request for their description.
+        // The emulator allows access to single registers only after a request for their
+        // description.
         let description = gdb.request("qXfer:features:read:target.xml:0,fff")?;
         if !description.starts_with(['l', 'm']) {
             return Err(SocketError::NotUnderstood(description));
@@ -184,7 +189,8 @@ impl Gdb {
     /// If the stub rejects the request or does not answer.
     pub fn detach(mut self) -> Result<(), SocketError> {
         match self.acknowledged("D") {
-            // The core continues before the stub answers, so a program that ends closes the connection.
+            // The core continues before the stub answers, so a program that ends closes the
+            // connection.
             Err(SocketError::Lost(_)) => Ok(()),
             other => other,
         }

@@ -37,7 +37,8 @@ impl LogDecoder {
     /// The decoder for an image's log. Without defmt symbols the log is not readable.
     ///
     /// # Errors
-    /// If the image's defmt symbols are damaged or of a version or encoding that this program cannot read.
+    /// If the image's defmt symbols are damaged or of a version or encoding that this program
+    /// cannot read.
     pub fn new(image: &Image) -> Result<Self, LogError> {
         // Some damage makes the crate panic.
         let Ok(table) = catch_unwind(|| Table::parse(&image.bytes)) else {
@@ -59,7 +60,8 @@ impl LogDecoder {
         self.table.is_some()
     }
 
-    /// Reads the console to its end; `on_line` is called with each line of the log, if it is readable.
+    /// Reads the console to its end; `on_line` is called with each line of the log, if it is
+    /// readable.
     pub fn decode(&self, mut console: impl std::io::Read, mut on_line: impl FnMut(&str)) {
         let mut buffer = [0; 4096];
         let mut frame = Vec::with_capacity(FRAME_BYTES);

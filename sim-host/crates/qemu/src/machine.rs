@@ -57,8 +57,9 @@ impl Machine {
         }
     }
 
-    /// Options for a repeatable run: virtual time is counted in instructions, and idle time is skipped. An instruction takes 2^5 ns. On
-    /// the STM32F405 it takes 2^3 ns, because its emulated timers run about ten times faster than their nominal clock.
+    /// Options for a repeatable run: virtual time is counted in instructions, and idle time is
+    /// skipped. An instruction takes 2^5 ns. On the STM32F405 it takes 2^3 ns, because its
+    /// emulated timers run about ten times faster than their nominal clock.
     pub(crate) fn instruction_shift(self) -> u32 {
         match self {
             Self::Mps2An386 | Self::Mps2An500 => 5,

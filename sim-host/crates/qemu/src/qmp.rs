@@ -12,7 +12,8 @@ pub struct Qmp {
 }
 
 impl Qmp {
-    /// Connects to the emulator at the local socket `path`. `limit` is the time limit of the connection and of each later request.
+    /// Connects to the emulator at the local socket `path`. `limit` is the time limit of the
+    /// connection and of each later request.
     ///
     /// # Errors
     /// If the emulator does not answer in time.

@@ -89,7 +89,8 @@ pub enum RunError {
 /// A finished run.
 #[derive(Debug, Clone)]
 pub struct Finished {
-    /// The firmware's exit code. It is 0 only if the log confirms that the run is complete, or is not readable.
+    /// The firmware's exit code. It is 0 only if the log confirms that the run is complete, or is
+    /// not readable.
     pub exit_code: i32,
     /// The last lines of its log.
     pub log: Vec<String>,
@@ -114,11 +115,13 @@ pub fn meaning(exit_code: i32) -> &'static str {
     }
 }
 
-/// Runs an image with the given settings in `directory`, into which it writes its telemetry. `on_line` is called with each log line.
+/// Runs an image with the given settings in `directory`, into which it writes its telemetry.
+/// `on_line` is called with each log line.
 ///
 /// # Errors
-/// If the emulator is missing or fails, the image has no readable log, the firmware does not end within `limit`, or exit code 0 comes
-/// without the log line of a complete run. A firmware that ends with another exit code is a finished run.
+/// If the emulator is missing or fails, the image has no readable log, the firmware does not end
+/// within `limit`, or exit code 0 comes without the log line of a complete run. A firmware that
+/// ends with another exit code is a finished run.
 pub fn run(
     image: &Image,
     machine: Machine,
@@ -260,8 +263,8 @@ pub(crate) fn finish(
     Ok(Finished { exit_code, log })
 }
 
-/// The firmware's exit code. The emulator's own failures end with 1 and a message, or by a signal; the firmware never ends
-/// with 1.
+/// The firmware's exit code. The emulator's own failures end with 1 and a message, or by a signal;
+/// the firmware never ends with 1.
 pub(crate) fn exit_code(status: ExitStatus, message: String) -> Result<i32, RunError> {
     match status.code() {
         Some(exit_code) if exit_code != 1 => Ok(exit_code),

@@ -1,4 +1,5 @@
-//! The ECU in the emulator with one exchange per PWM period: the host replaces its servo and sensors.
+//! The ECU in the emulator with one exchange per PWM period: the host replaces its servo and
+//! sensors.
 
 use crate::emulator::{Emulator, first_words, is_ready};
 use crate::log::{Lines, LogDecoder};
@@ -35,7 +36,8 @@ const LOCKUP: &str = "Lockup";
 pub enum LinkKind {
     /// Pipes, read and written by the emulator. The host starts each PWM period: fast.
     Files,
-    /// The same, but the board's timer starts each PWM period, and the gate measures the time between control ticks.
+    /// The same, but the board's timer starts each PWM period, and the gate measures the time
+    /// between control ticks.
     Timed,
     /// The board's UART, framed, with the host's timing: realistic and slow.
     Uart,
@@ -127,7 +129,8 @@ impl Attended {
         }
     }
 
-    /// Waits for the end, at most `limit`. Returns the emulator's status, the log, and the emulator's message.
+    /// Waits for the end, at most `limit`. Returns the emulator's status, the log, and the
+    /// emulator's message.
     fn end(&mut self, limit: Duration) -> Result<(ExitStatus, Vec<String>, String), RunError> {
         let Some(status) = run::wait(&mut self.emulator, limit)? else {
             return Err(self.timed_out(limit));
@@ -157,10 +160,12 @@ impl Attended {
 }
 
 impl Session {
-    /// Starts the image with the scenario's settings and opens the link; waits at most `limit` for each answer.
+    /// Starts the image with the scenario's settings and opens the link; waits at most `limit` for
+    /// each answer.
     ///
     /// # Errors
-    /// If the emulator is missing or fails, the image has no readable log, or the firmware does not open its end.
+    /// If the emulator is missing or fails, the image has no readable log, or the firmware does not
+    /// open its end.
     pub fn start(
         image: &Image,
         machine: Machine,
@@ -194,7 +199,8 @@ impl Session {
         })
     }
 
-    /// Receives the ECU's packet of the next PWM period. The ECU then waits for [`send`](Self::send).
+    /// Receives the ECU's packet of the next PWM period. The ECU then waits for
+    /// [`send`](Self::send).
     ///
     /// # Errors
     /// If the emulator has ended, or sends nothing within the limit.
@@ -340,7 +346,8 @@ impl Transport {
     }
 }
 
-/// Fills `bytes`, waiting at most `limit` for each part, because a faulty ECU may stop in the middle of a packet.
+/// Fills `bytes`, waiting at most `limit` for each part, because a faulty ECU may stop in the
+/// middle of a packet.
 fn read_exact(file: &mut File, limit: Duration, mut bytes: &mut [u8]) -> std::io::Result<()> {
     while !bytes.is_empty() {
         let length = read_some(file, limit, bytes)?;
@@ -402,7 +409,8 @@ fn receive_packet(
     let mut buffer = [0; 64];
     // Much more than a packet, plus the bytes that may precede the first.
     for _ in 0..64 {
-        // The ECU sends nothing after its packet until it is answered, so no byte of a later packet is read.
+        // The ECU sends nothing after its packet until it is answered, so no byte of a later packet
+        // is read.
         let length = read_some(file, limit, &mut buffer)?;
         for &byte in &buffer[..length] {
             match deframer.push(byte) {

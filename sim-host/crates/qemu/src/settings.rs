@@ -3,8 +3,8 @@
 use shared_model::Scenario;
 use toml::{Table, Value};
 
-/// One `section.name=value` per parameter, complete, so that the firmware's presets have no effect. The numbers are f32 values in
-/// the shortest decimal form that reads back to the same bits.
+/// One `section.name=value` per parameter, complete, so that the firmware's presets have no effect.
+/// The numbers are f32 values in the shortest decimal form that reads back to the same bits.
 ///
 /// ```
 /// let settings = qemu::settings::of(&shared_model::Scenario::<f32>::reconstruction());

@@ -40,7 +40,8 @@ pub(crate) struct Socket {
 }
 
 impl Socket {
-    /// Connects as soon as the emulator listens. `limit` is the time limit of the connection and of each answer.
+    /// Connects as soon as the emulator listens. `limit` is the time limit of the connection and of
+    /// each answer.
     pub(crate) fn connect(path: &Path, limit: Duration) -> Result<Self, SocketError> {
         let start = Instant::now();
         let stream = loop {

@@ -172,7 +172,8 @@ impl Recording {
         })
     }
 
-    /// Instructions in `counts` of the cost clock; counts themselves where the core is not simulated.
+    /// Instructions in `counts` of the cost clock; counts themselves where the core is not
+    /// simulated.
     pub fn instructions(&self, counts: u16) -> u32 {
         let clock = f64::from(self.header.cost_clock_hz);
         match self.header.instruction_rate_hz {

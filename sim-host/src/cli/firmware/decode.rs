@@ -9,7 +9,8 @@ use qemu::meaning;
 use qemu::telemetry::Recording;
 use std::path::PathBuf;
 
-/// Check a telemetry file of the firmware, report how its run ended, and write its trajectory as CSV.
+/// Check a telemetry file of the firmware, report how its run ended, and write its trajectory as
+/// CSV.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host firmware run target/thumbv7em-none-eabihf/firmware/ecu \\

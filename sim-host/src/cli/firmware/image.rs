@@ -11,10 +11,12 @@ use serde::Serialize;
 use sim_host::firmware::PRIORITIES;
 use std::path::PathBuf;
 
-/// Report the size of an image and its worst stack with the chain of calls, computed from the machine code.
+/// Report the size of an image and its worst stack with the chain of calls, computed from the
+/// machine code.
 ///
-/// The image must be compiled with `-Zemit-stack-sizes`, as by `cargo xtask proofs`. The worst stack is an upper bound: the sum of the
-/// deepest stacks of main program, control task, PWM interrupt, hard fault and watchdog, which preempt each other.
+/// The image must be compiled with `-Zemit-stack-sizes`, as by `cargo xtask proofs`. The worst
+/// stack is an upper bound: the sum of the deepest stacks of main program, control task, PWM
+/// interrupt, hard fault and watchdog, which preempt each other.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   cargo xtask proofs

@@ -46,7 +46,8 @@ pub struct Arguments {
     settings: Vec<String>,
 }
 
-/// Keys of settings that are not parameters of a scenario: for every image, and for the fault drill.
+/// Keys of settings that are not parameters of a scenario: for every image, and for the fault
+/// drill.
 const OWN_KEYS: [&str; 2] = [TELEMETRY, "fault="];
 const TELEMETRY: &str = "telemetry=";
 
@@ -114,7 +115,8 @@ fn check_settings(settings: &[String]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The error of an invalid setting: that of the configuration, which has the same keys and lists similar ones.
+/// The error of an invalid setting: that of the configuration, which has the same keys and lists
+/// similar ones.
 fn refusal(setting: &str, error: SettingError) -> anyhow::Error {
     let in_configuration = setting.split_once('=').and_then(|(key, value)| {
         let value = Value::String(value.into());
@@ -142,7 +144,8 @@ fn written(file: &Path) -> Option<SystemTime> {
     metadata.modified().ok().filter(|_| metadata.is_file())
 }
 
-/// Checks that a complete run has written complete telemetry. A pipe or a device cannot be read again.
+/// Checks that a complete run has written complete telemetry. A pipe or a device cannot be read
+/// again.
 fn check_telemetry(file: &Path, before: Option<SystemTime>) -> anyhow::Result<()> {
     let name = file.display();
     if file.exists() && !file.is_file() {

@@ -16,7 +16,8 @@ const LEAST: f64 = 0.5;
 /// Left end, right end and height of a bar.
 type Bar = (f64, f64, f64);
 
-/// The figure: a row for each run, named on the left; there the control task, on the right the PWM task.
+/// The figure: a row for each run, named on the left; there the control task, on the right the PWM
+/// task.
 pub fn draw(runs: &[(&str, &Instructions)]) -> String {
     let heading = "Instructions of the control task (left) and of the PWM task (right)";
     figure(heading, &[], stack_height(runs.len(), PANEL), |area| {

@@ -53,7 +53,8 @@ pub struct Cell {
     pub dither_amplitude_v: f64,
     /// Kind of the motion.
     pub kind: Kind,
-    /// Maxima of the yaw rate in a cycle, whatever the exponent says; 0 at rest, none without a cycle.
+    /// Maxima of the yaw rate in a cycle, whatever the exponent says; 0 at rest, none without a
+    /// cycle.
     pub period: Option<u32>,
     /// Bands that the maxima of a chaotic motion visit in turn.
     pub bands: Option<u32>,
@@ -138,7 +139,8 @@ pub enum InvalidCell {
 
 /// The cells at some places of a plan.
 ///
-/// Trajectories run through their transients without tangent vectors. The exponent is taken over what follows but for its first tenth.
+/// Trajectories run through their transients without tangent vectors. The exponent is taken over
+/// what follows but for its first tenth.
 ///
 /// # Errors
 /// If a place's scenario is not valid, or none for the engine.

@@ -21,7 +21,8 @@ const BESIDE: i32 = 184;
 const KEY_STEP: usize = 46;
 /// Cells without the number that a panel shows.
 const NONE: Colour = Colour(0x2a, 0x2a, 0x2b);
-/// Exponents are drawn down to this multiple of the greatest: how fast a motion settles is not the matter.
+/// Exponents are drawn down to this multiple of the greatest: how fast a motion settles is not the
+/// matter.
 const LEAST_EXPONENT_SHARE: f64 = -1.0;
 /// Share of exponents beyond the ends of their scale.
 const BEYOND: f64 = 0.002;
@@ -91,7 +92,8 @@ impl Shown {
     }
 }
 
-/// The exponent, 1/s; at most zero unless it counts as positive, so that scatter about zero is not taken for chaos.
+/// The exponent, 1/s; at most zero unless it counts as positive, so that scatter about zero is not
+/// taken for chaos.
 fn shown_exponent(cell: &Cell) -> Option<f64> {
     let (exponent, threshold) = (cell.exponent_per_s?, cell.exponent_threshold_per_s?);
     let positive = exponent > threshold;
@@ -158,8 +160,9 @@ impl Class {
     }
 }
 
-/// The map as an SVG document: a column of panels for each sheet side by side with that of another waveform from the same start, the
-/// starts below each other. `cells` are all of the plan, in its order.
+/// The map as an SVG document: a column of panels for each sheet side by side with that of another
+/// waveform from the same start, the starts below each other. `cells` are all of the plan, in its
+/// order.
 pub fn draw(plan: &Plan, cells: &[Cell]) -> String {
     let sheets: Vec<(&Sheet, &[Cell])> = plan
         .sheets

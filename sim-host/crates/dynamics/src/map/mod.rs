@@ -1,4 +1,5 @@
-//! The map: exponent, period, extent and kind of the motion over wheel speed N and dither amplitude W.
+//! The map: exponent, period, extent and kind of the motion over wheel speed N and dither amplitude
+//! W.
 //!
 //! | question | module |
 //! |---|---|
@@ -8,8 +9,8 @@
 //! | how do data tools read it? | [`table`] |
 //! | how is it drawn? | [`figure`] |
 //!
-//! A map is made in tiles, each kept as a file of its own as soon as it is done. What a cell holds depends on the plan alone: not
-//! on threads, on interruptions, or on where its tile was made.
+//! A map is made in tiles, each kept as a file of its own as soon as it is done. What a cell holds
+//! depends on the plan alone: not on threads, on interruptions, or on where its tile was made.
 
 pub mod cell;
 pub mod figure;

@@ -82,8 +82,8 @@ pub struct Sheet {
 pub struct Plan {
     /// Version of the program.
     pub version: String,
-    /// The vehicle and its start. Wheel speed, waveform and amplitude are those of each cell; the dither acts through its mean and
-    /// from the start.
+    /// The vehicle and its start. Wheel speed, waveform and amplitude are those of each cell; the
+    /// dither acts through its mean and from the start.
     pub scenario: Scenario<f64>,
     /// The sheets, each with as many amplitudes.
     pub sheets: Vec<Sheet>,
@@ -240,7 +240,8 @@ impl Plan {
         self.cells().div_ceil(CELLS_A_TILE)
     }
 
-    /// Where each cell of a tile lies. Cells are counted by sheet, therein by wheel speed, therein by amplitude.
+    /// Where each cell of a tile lies. Cells are counted by sheet, therein by wheel speed, therein
+    /// by amplitude.
     pub fn places(&self, tile: usize) -> Vec<Place> {
         let first = tile * CELLS_A_TILE;
         let last = self.cells().min(first + CELLS_A_TILE);
@@ -293,7 +294,8 @@ impl Plan {
         }
     }
 
-    /// The motions of each sheet at the ends of its axes: all parameters have one range, so the cells between are valid too.
+    /// The motions of each sheet at the ends of its axes: all parameters have one range, so the
+    /// cells between are valid too.
     fn corners(&self, axes: &Axes) -> Vec<Scenario<f64>> {
         let ends = |values: &Values| [0, values.count() - 1];
         let of_sheet = |sheet: usize| {

@@ -1,4 +1,5 @@
-//! The map as a Parquet table: the columns of the CSV, and the plan beside them. Written, and read back.
+//! The map as a Parquet table: the columns of the CSV, and the plan beside them. Written, and read
+//! back.
 
 use super::cell::{Cell, InvalidCell};
 use super::plan::{Plan, PlanError};
@@ -23,7 +24,8 @@ use std::sync::Arc;
 /// Key of the file's metadata under which the plan is, as JSON.
 pub const PLAN_KEY: &str = "plan";
 
-/// Most rows that a byte of a file can hold: neighbours differ in at least one number, which takes a bit.
+/// Most rows that a byte of a file can hold: neighbours differ in at least one number, which takes
+/// a bit.
 const MOST_ROWS_A_BYTE: usize = 8;
 /// First bytes of a Parquet file.
 const MAGIC: &[u8] = b"PAR1";
@@ -140,7 +142,8 @@ fn read_whole(bytes: Bytes) -> Result<(Plan, Vec<Cell>), TableError> {
     let table = SerializedFileReader::new(bytes).map_err(TableError::NotParquet)?;
     let metadata = table.metadata().file_metadata();
     let plan = plan(metadata)?;
-    // A few bytes may claim to be any number of rows, so they are counted against plan and file before memory is taken.
+    // A few bytes may claim to be any number of rows, so they are counted against plan and file
+    // before memory is taken.
     if metadata.num_rows() != plan.cells() as i64
         || plan.cells() > MOST_ROWS_A_BYTE.saturating_mul(length)
     {

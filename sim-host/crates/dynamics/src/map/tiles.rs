@@ -1,8 +1,9 @@
 //! The tiles of a map, each in a file that is complete or not there.
 //!
-//! A tile's file is a line with the CRC-32 of all below it, a line of JSON with the tile's number and the whole plan, and the rows
-//! of its cells as CSV. What one run leaves, another continues from; what several machines make is put together. A file with one
-//! byte changed is refused, and so is a plan or a cell that is none, whatever its check sum: no count of a plan is believed
+//! A tile's file is a line with the CRC-32 of all below it, a line of JSON with the tile's number
+//! and the whole plan, and the rows of its cells as CSV. What one run leaves, another continues
+//! from; what several machines make is put together. A file with one byte changed is refused, and
+//! so is a plan or a cell that is none, whatever its check sum: no count of a plan is believed
 //! before the plan is checked.
 
 use super::cell::{Cell, InvalidCell, cells};
@@ -179,8 +180,8 @@ impl<'a> Folder<'a> {
         Ok(folder)
     }
 
-    /// Computes the tiles of a shard that are not there yet, several at once, and keeps each as soon as it is done. Those not begun
-    /// when it is asked to stop are left out.
+    /// Computes the tiles of a shard that are not there yet, several at once, and keeps each as
+    /// soon as it is done. Those not begun when it is asked to stop are left out.
     ///
     /// # Errors
     /// If a tile cannot be computed or written.

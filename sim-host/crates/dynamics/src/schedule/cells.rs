@@ -49,7 +49,8 @@ pub struct Cell {
     pub wheel_speed_rpm: f64,
     /// Amplitude W, V.
     pub amplitude_v: f64,
-    /// Kind of the motion from the scenario's start; [`Kind::Undecided`] stands for all that do not repeat.
+    /// Kind of the motion from the scenario's start; [`Kind::Undecided`] stands for all that do
+    /// not repeat.
     pub given: Kind,
     /// The same from the mirrored start, on the other lobe of the steering angle.
     pub mirrored: Kind,
@@ -86,8 +87,8 @@ pub struct Column {
     pub cells: Vec<Cell>,
 }
 
-/// The motions of scenarios from both starts under the mean of their dither, which is on from the start; `None` if it was
-/// stopped.
+/// The motions of scenarios from both starts under the mean of their dither, which is on from the
+/// start; `None` if it was stopped.
 ///
 /// # Errors
 /// If a scenario is not valid.
@@ -112,8 +113,9 @@ pub fn cells(
 
 /// The column of each wheel speed of the plan; `None` if it was stopped.
 ///
-/// It begins with the plan's grid, whose cells are run unless they are there `first`. Edges are bisected between rest, period
-/// one and all else, all of them side by side; those within all else are not.
+/// It begins with the plan's grid, whose cells are run unless they are there `first`. Edges are
+/// bisected between rest, period one and all else, all of them side by side; those within all else
+/// are not.
 pub(super) fn columns(
     scenario: &Scenario<f64>,
     plan: &Plan,

@@ -14,15 +14,18 @@ use shared_model::vehicle::YAW_RATE;
 /// Time in which the motion settles under the dither, and in which it is looked at, s.
 const DITHER_TRANSIENT_S: f64 = 60.0;
 const MOTION_S: f64 = 40.0;
-/// Periods of the dither over which the motion is averaged: the ripple is gone, the slow motion is not touched.
+/// Periods of the dither over which the motion is averaged: the ripple is gone, the slow motion is
+/// not touched.
 const SMOOTHED_PERIODS: f64 = 2.0;
-/// Less swing of the smoothed yaw rate is what the ripple leaves of rest, rad/s; cycles have some tenths.
+/// Less swing of the smoothed yaw rate is what the ripple leaves of rest, rad/s; cycles have some
+/// tenths.
 const AT_REST_RAD_PER_S: f64 = 1e-3;
 
-/// The motions under the amplitudes that the ECU looks up at the table's speeds and midway between them, by speed; `None`
-/// if it was stopped.
+/// The motions under the amplitudes that the ECU looks up at the table's speeds and midway between
+/// them, by speed; `None` if it was stopped.
 ///
-/// As the ECU meets them: the undithered motion settles from either start before the dither sets in.
+/// As the ECU meets them: the undithered motion settles from either start before the dither sets
+/// in.
 pub(super) fn check(
     scenario: &Scenario<f64>,
     speeds_rpm: &Values,

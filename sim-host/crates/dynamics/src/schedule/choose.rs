@@ -56,11 +56,12 @@ pub struct Entry {
     pub coexist_undithered: bool,
 }
 
-/// The entry of each column. `margin` is the share of the range by which an amplitude lies above the range's lower end, and
-/// it keeps at least `room_v` from both ends.
+/// The entry of each column. `margin` is the share of the range by which an amplitude lies above
+/// the range's lower end, and it keeps at least `room_v` from both ends.
 ///
-/// A range is good at its column's speed and at the neighbouring ones, because the table is used in steps: the amplitude of
-/// a speed also acts anywhere up to its neighbours. There, rest is good too.
+/// A range is good at its column's speed and at the neighbouring ones, because the table is used in
+/// steps: the amplitude of a speed also acts anywhere up to its neighbours. There, rest is good
+/// too.
 pub(super) fn choose(columns: &[Column], margin: f64, room_v: f64) -> Vec<Entry> {
     let entry = |k: usize| {
         let neighbours = &columns[k.saturating_sub(1)..columns.len().min(k + 2)];
@@ -165,7 +166,8 @@ mod tests {
         let entries = choose(&columns, 0.25, 0.004);
         assert_eq!(entries[0].choice, Choice::Undithered);
         assert_eq!(entries[0].amplitude_v, 0.0);
-        // 0.03 to 0.06 V: the window at 0.01 V is none at the neighbours, 0.07 V is bad at the last speed.
+        // 0.03 to 0.06 V: the window at 0.01 V is none at the neighbours, 0.07 V is bad at the last
+        // speed.
         assert_eq!(entries[1].choice, Choice::PeriodOne);
         assert_eq!(entries[1].amplitude_v, 0.0375);
         // 0.03 to 0.05 V, where the last speed itself has period one.

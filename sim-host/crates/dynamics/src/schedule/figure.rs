@@ -105,7 +105,8 @@ fn map(panel: &Axes, analysis: &Analysis) {
     }
 }
 
-/// The stretches of a column in which its cells are alike; each cell reaches half way to its neighbours.
+/// The stretches of a column in which its cells are alike; each cell reaches half way to its
+/// neighbours.
 fn stretches<K: PartialEq>(column: &Column, of: impl Fn(&Cell) -> K) -> Vec<(f64, f64, K)> {
     let cells = &column.cells;
     let mut stretches = Vec::new();

@@ -29,7 +29,8 @@ pub fn fitting(scenario: &Scenario<f64>, square: &Plan, sine: &Plan) -> Result<M
     MapPlan::new(*scenario, sheets.collect(), speeds_rpm, square.timing)
 }
 
-/// In what a map differs from the fitting one, in words; nothing if it fits. Sheets that it has beyond those do no harm.
+/// In what a map differs from the fitting one, in words; nothing if it fits. Sheets that it has
+/// beyond those do no harm.
 pub fn misfits(map: &MapPlan, fitting: &MapPlan) -> Vec<String> {
     let mut misfits = Vec::new();
     for sheet in &fitting.sheets {
@@ -87,7 +88,8 @@ fn sheet_of(map: &MapPlan, waveform: Waveform, start: Start) -> Option<usize> {
     map.sheets.iter().position(is_it)
 }
 
-/// A waveform's cells of the plan out of a map that fits, in the plan's order; none without the waveform's sheets.
+/// A waveform's cells of the plan out of a map that fits, in the plan's order; none without the
+/// waveform's sheets.
 pub fn first_cells(
     map: &MapPlan,
     cells: &[cell::Cell],
@@ -109,8 +111,8 @@ pub fn first_cells(
     Some(places.zip(given?.iter().zip(mirrored?)).map(cell).collect())
 }
 
-/// The kind by the period alone, as a schedule's own runs judge it: the map calls a motion undecided whose period the exponent
-/// contradicts, and keeps the period.
+/// The kind by the period alone, as a schedule's own runs judge it: the map calls a motion
+/// undecided whose period the exponent contradicts, and keeps the period.
 fn kind(cell: &cell::Cell) -> Kind {
     match (cell.kind, cell.period) {
         (cell::Kind::Diverges, _) => Kind::Diverges,
@@ -154,7 +156,8 @@ mod tests {
         assert_eq!(misfits.len(), 3, "{misfits:?}");
     }
 
-    /// The cells of a map, with sheets in another order, are told apart by a number as their period.
+    /// The cells of a map, with sheets in another order, are told apart by a number as their
+    /// period.
     #[test]
     fn each_cell_comes_from_its_two_in_the_map() {
         let mut map = map();

@@ -1,4 +1,5 @@
-//! The dither's schedule: at each wheel speed N the least amplitude W that gives period one, with a margin.
+//! The dither's schedule: at each wheel speed N the least amplitude W that gives period one, with a
+//! margin.
 //!
 //! | question | module |
 //! |---|---|
@@ -69,9 +70,10 @@ pub fn runs(plan: &Plan) -> usize {
 
 /// Makes the schedule of the scenario's waveform: map, choice, check.
 ///
-/// The map takes the mean of the dither. A range of W narrower than the step between amplitudes can be missed, but none is
-/// used that is narrower than a count of the PWM. The result does not depend on the number of threads. The cells of the plan's
-/// grid are run, unless [`from_map::first_cells`] gives them as `first`. `None` if it was stopped.
+/// The map takes the mean of the dither. A range of W narrower than the step between amplitudes can
+/// be missed, but none is used that is narrower than a count of the PWM. The result does not depend
+/// on the number of threads. The cells of the plan's grid are run, unless [`from_map::first_cells`]
+/// gives them as `first`. `None` if it was stopped.
 ///
 /// # Errors
 /// If the scenario has no waveform, or one of a speed and amplitude is not valid.

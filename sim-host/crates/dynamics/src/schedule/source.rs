@@ -5,8 +5,9 @@ use super::choose::{Choice, Entry};
 use shared_model::dither::Waveform;
 use std::fmt::Write;
 
-/// Source of `shared_model::schedule_table` for schedules over the same speeds; `made_by` is the command and what it was
-/// run on, a sentence each. The text is formatted as rustfmt does, and depends on nothing else.
+/// Source of `shared_model::schedule_table` for schedules over the same speeds; `made_by` is the
+/// command and what it was run on, a sentence each. The text is formatted as rustfmt does, and
+/// depends on nothing else.
 pub fn source(analyses: &[Analysis], made_by: &[String]) -> String {
     let points = analyses.first().map_or(0, |one| one.entries.len());
     let mut text = String::from("//! The ECU's dither schedules.\n//!\n");

@@ -6,8 +6,8 @@ use super::series::{Atan, ORDER, Series, SinCos, product};
 use pulp::Simd;
 use shared_model::vehicle::{SIDESLIP, STEERING_ANGLE, YAW_RATE};
 
-/// Coefficient `n` of small slip angles, front and rear: second lines of (4) and (5). They are linear, so a state's and a tangent
-/// vector's are alike.
+/// Coefficient `n` of small slip angles, front and rear: second lines of (4) and (5). They are
+/// linear, so a state's and a tangent vector's are alike.
 #[inline(always)]
 pub(super) fn small_angles<S: Simd, const V: usize>(
     n: usize,
@@ -19,7 +19,8 @@ pub(super) fn small_angles<S: Simd, const V: usize>(
     [front, chassis.rear_lever_s.mul_add(gamma, beta)]
 }
 
-/// Exact slip angles, first lines of (4) and (5), and the cosine that (3) puts to the yaw acceleration.
+/// Exact slip angles, first lines of (4) and (5), and the cosine that (3) puts to the yaw
+/// acceleration.
 pub(super) struct ExactAngles<S: Simd, const V: usize, const K: usize> {
     sideslip: SinCos<S, V>,
     /// gamma cos(beta), and gamma sin(beta).

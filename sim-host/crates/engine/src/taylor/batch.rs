@@ -18,19 +18,23 @@ use pulp::Simd;
 use shared_model::friction::FrictionMode;
 use shared_model::vehicle::STEERING_RATE;
 
-/// Factor by which a step shrinks until it meets the tolerance, and its inverse by which it grows where that would have met it.
+/// Factor by which a step shrinks until it meets the tolerance, and its inverse by which it grows
+/// where that would have met it.
 const SHRINK: f64 = 0.92;
 /// Factors tried without asking whether they are needed: the processor would rather try than guess.
 const USUAL_SHRINKS: usize = 3;
 /// Factors tried before a step is given up.
 const MOST_SHRINKS: usize = 300;
-/// A mode shorter than this, s, is one of a row in which a motion slides along a step of its friction law.
+/// A mode shorter than this, s, is one of a row in which a motion slides along a step of its
+/// friction law.
 const SHORT_MODE_S: f64 = 1e-6;
 /// Largest last term of a tangent vector's expansion, as a share of its length.
 const TANGENT_TOLERANCE: f64 = 1e-5;
-/// Steps after which the last motions take turns, interruptions are heard, and the number of steps is held against its bound.
+/// Steps after which the last motions take turns, interruptions are heard, and the number of steps
+/// is held against its bound.
 const STEPS_A_TURN: usize = 64;
-/// Steps that a motion may take: at once, and per second of motion. The paper's take some ten per second.
+/// Steps that a motion may take: at once, and per second of motion. The paper's take some ten per
+/// second.
 const STEPS_AT_ONCE: f64 = 1e5;
 const STEPS_PER_S: f64 = 1e5;
 /// Mode transitions in a row after short modes that indicate a sliding mode.
@@ -146,8 +150,8 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Batch<'a, S, V, K
         self.finish_segments();
     }
 
-    /// Ends motions that take more steps than a motion of their time may: with the tolerance's bound on a step, no input makes a run
-    /// endless.
+    /// Ends motions that take more steps than a motion of their time may: with the tolerance's
+    /// bound on a step, no input makes a run endless.
     #[inline(never)]
     fn bound_steps(&mut self) {
         for lane in 0..self.lanes.len() {
@@ -170,7 +174,8 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Batch<'a, S, V, K
         }
     }
 
-    /// The step of each lane: no longer than its last term is within the tolerance, nor than its piece.
+    /// The step of each lane: no longer than its last term is within the tolerance, nor than its
+    /// piece.
     #[inline(always)]
     fn choose_step(&mut self) -> Lanes<S, V> {
         let simd = self.simd;
@@ -193,8 +198,8 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Batch<'a, S, V, K
         step_s.min(self.left_s)
     }
 
-    /// Greatest last term of the tangent vectors, weighed so that the tolerance of a state is theirs. At rest the state's own terms
-    /// vanish, and would allow any step.
+    /// Greatest last term of the tangent vectors, weighed so that the tolerance of a state is
+    /// theirs. At rest the state's own terms vanish, and would allow any step.
     #[inline(always)]
     fn last_of_tangents(&self) -> Lanes<S, V> {
         let zero = self.step_s.zero();
@@ -230,9 +235,9 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Batch<'a, S, V, K
         }
     }
 
-    /// The mode of a lane ends, which `lasted_s` since the step began; the guard is at `bound`. Tangent vectors jump by the
-    /// saltation matrix (M. di Bernardo et al., Piecewise-smooth Dynamical Systems, section 2.5): only the steering's
-    /// acceleration jumps.
+    /// The mode of a lane ends, which `lasted_s` since the step began; the guard is at `bound`.
+    /// Tangent vectors jump by the saltation matrix (M. di Bernardo et al., Piecewise-smooth
+    /// Dynamical Systems, section 2.5): only the steering's acceleration jumps.
     #[inline(never)]
     fn change_mode(&mut self, lane: usize, bound: f64, lasted_s: f64) {
         let mut x = Vector4::from(self.state(lane));

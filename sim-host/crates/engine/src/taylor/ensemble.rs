@@ -11,7 +11,8 @@ use shared_model::Scenario;
 use shared_model::vehicle::SlipForm;
 use std::marker::PhantomData;
 
-/// Trajectories of scenarios from their initial states, under the mean of their dither from the start.
+/// Trajectories of scenarios from their initial states, under the mean of their dither from the
+/// start.
 #[derive(Debug, Clone)]
 pub struct Ensemble {
     tasks: Vec<Task>,
@@ -27,7 +28,8 @@ impl Ensemble {
         Ok(Self { tasks })
     }
 
-    /// Integrates all over a span, with `K` tangent vectors each, on all threads. The results are in the order of the scenarios.
+    /// Integrates all over a span, with `K` tangent vectors each, on all threads. The results are
+    /// in the order of the scenarios.
     pub fn integrate<const K: usize>(&self, span: &Span) -> Vec<Trajectory<K>>
     where
         Tangents<K>: Compiled<K>,
@@ -56,7 +58,8 @@ impl Ensemble {
 #[derive(Debug)]
 pub struct Tangents<const K: usize>;
 
-/// A number of tangent vectors for which this crate holds compiled code, so that callers do not compile the engine again.
+/// A number of tangent vectors for which this crate holds compiled code, so that callers do not
+/// compile the engine again.
 pub trait Compiled<const K: usize> {
     /// Integrates the ensemble with a given instruction set.
     fn integrate(ensemble: &Ensemble, arch: Arch, span: &Span) -> Vec<Trajectory<K>>;
@@ -107,7 +110,8 @@ fn integrate<E: Integrated, const K: usize>(
     results.into_iter().map(|(_, found)| found).collect()
 }
 
-/// A right-hand side with the number of vectors in which its trajectories are integrated side by side.
+/// A right-hand side with the number of vectors in which its trajectories are integrated side by
+/// side.
 trait Integrated: Equation {
     /// Integrates trajectories of the queue, up to `most` at once.
     fn integrate_queue<'a, S: Simd, const K: usize>(
@@ -169,7 +173,8 @@ mod tests {
     use shared_model::dither::Waveform;
     use shared_model::tire::TireModel;
 
-    /// Trajectories of all regimes: chaos, a period, stick, rest, and one that diverges; and of both kinds of right-hand side.
+    /// Trajectories of all regimes: chaos, a period, stick, rest, and one that diverges; and of
+    /// both kinds of right-hand side.
     fn scenarios() -> Vec<Scenario<f64>> {
         let scenario = |k: usize| {
             let mut scenario = Scenario::reconstruction();
@@ -213,8 +218,8 @@ mod tests {
         }
     }
 
-    /// Neither the instruction set, nor the neighbours in a vector, nor the number of threads changes a bit. On one thread the
-    /// motions are more than its lanes, and take turns.
+    /// Neither the instruction set, nor the neighbours in a vector, nor the number of threads
+    /// changes a bit. On one thread the motions are more than its lanes, and take turns.
     #[test]
     fn bits_are_the_same_on_every_path_and_in_every_company() {
         let scenarios = scenarios();

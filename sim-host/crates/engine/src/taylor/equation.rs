@@ -23,8 +23,8 @@ impl Equation for Polynomial {
     const UNROLLED: bool = true;
 }
 
-/// Exact slip angles, the Magic Formula, or both; alike for all motions of a flight. No polynomial, but sines and arctangents have
-/// recurrences too.
+/// Exact slip angles, the Magic Formula, or both; alike for all motions of a flight. No polynomial,
+/// but sines and arctangents have recurrences too.
 pub(super) struct Analytic;
 
 impl Equation for Analytic {

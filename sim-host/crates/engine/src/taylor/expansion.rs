@@ -1,8 +1,9 @@
 //! Taylor coefficients of the motion, many motions side by side.
 //!
-//! Each coefficient follows from those before it by sums of products (A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99). What
-//! is linear in the right-hand side (14) is here; the tyres' forces are in `forces`. Dry friction is a constant
-//! torque as long as its mode lasts. `tests` hold the recurrences against the shared model's derivative.
+//! Each coefficient follows from those before it by sums of products (A. Jorba, M. Zou,
+//! Experimental Mathematics 14 (2005) 99). What is linear in the right-hand side (14) is here; the
+//! tyres' forces are in `forces`. Dry friction is a constant torque as long as its mode lasts.
+//! `tests` hold the recurrences against the shared model's derivative.
 
 use super::chassis::{Chassis, Loads};
 use super::equation::Equation;
@@ -14,8 +15,8 @@ use shared_model::dither::Injection;
 use shared_model::friction::FrictionMode;
 use shared_model::vehicle::{Model, SIDESLIP, STEERING_ANGLE, STEERING_RATE, YAW_RATE};
 
-/// Numbers of the steering in a friction mode: its angular acceleration by motor and dry friction, by force of the front tyres, and
-/// by rate. All are 0 where it sticks.
+/// Numbers of the steering in a friction mode: its angular acceleration by motor and dry friction,
+/// by force of the front tyres, and by rate. All are 0 where it sticks.
 #[derive(Debug, Clone, Copy)]
 struct Steering<L> {
     acceleration: L,
@@ -92,7 +93,8 @@ impl<S: Simd, const V: usize, const K: usize, E: Equation> Expansion<S, V, K, E>
         self.steering.acceleration.as_mut_slice()[lane] = 0.0;
     }
 
-    /// Works out all coefficients from those of order 0, which are the state and the tangent vectors.
+    /// Works out all coefficients from those of order 0, which are the state and the tangent
+    /// vectors.
     #[inline(always)]
     pub fn expand(&mut self) {
         // One number at a time gains little by it, and costs the compiler as much.

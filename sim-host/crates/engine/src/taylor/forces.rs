@@ -82,7 +82,8 @@ impl<S: Simd, const V: usize, const K: usize, E: Equation> Forces<S, V, K, E> {
         }
     }
 
-    /// Coefficient `n` of its change along tangent vector `k`, given the vector's up to `n`. After that of the state.
+    /// Coefficient `n` of its change along tangent vector `k`, given the vector's up to `n`. After
+    /// that of the state.
     #[inline(always)]
     pub(crate) fn load_tangent(
         &mut self,

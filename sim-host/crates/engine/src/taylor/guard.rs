@@ -1,4 +1,5 @@
-//! Where friction modes end: a quantity of each lane that must stay within bounds, on the step's polynomials.
+//! Where friction modes end: a quantity of each lane that must stay within bounds, on the step's
+//! polynomials.
 
 use super::lanes::Lanes;
 use super::roots::{self, Polynomial};
@@ -10,7 +11,8 @@ use shared_model::dither::Injection;
 use shared_model::friction::FrictionMode;
 use shared_model::vehicle::Model;
 
-/// Least time between two changes of mode, s: an end sooner than that is rounding of the torque at its limit.
+/// Least time between two changes of mode, s: an end sooner than that is rounding of the torque at
+/// its limit.
 const SHORTEST_MODE_S: f64 = 1e-9;
 
 /// [`Guard`]s in lanes, of the quantity `argument + per_force * F_f`.
@@ -60,7 +62,8 @@ impl<S: Simd, const V: usize> Guards<Lanes<S, V>> {
         self.upper.as_mut_slice()[lane] = guard.upper - shift;
     }
 
-    /// Positive in lanes that certainly stay within their bounds for the whole step, given the series of argument and force.
+    /// Positive in lanes that certainly stay within their bounds for the whole step, given the
+    /// series of argument and force.
     #[inline(always)]
     pub fn room(
         &self,
@@ -100,7 +103,8 @@ impl<S: Simd, const V: usize> Guards<Lanes<S, V>> {
         above.min(below)
     }
 
-    /// The first instant within `most_s` at which a lane's quantity leaves its bounds, and the bound.
+    /// The first instant within `most_s` at which a lane's quantity leaves its bounds, and the
+    /// bound.
     #[inline(always)]
     pub(crate) fn first_end(
         &self,
@@ -168,10 +172,11 @@ impl<S: Simd, const V: usize> Path<Lanes<S, V>> {
         }
     }
 
-    /// Positive where the polynomial is above `bound` within the whole step, its beginning left out. A polynomial is no farther
-    /// from its chord than the sum of the terms that bend it. Three of them are tried: the polynomial itself; what is behind its
-    /// constant term, over t, for one that has just left the bound; and what is behind its linear one, over t^2, for one that
-    /// left it with no speed.
+    /// Positive where the polynomial is above `bound` within the whole step, its beginning left
+    /// out. A polynomial is no farther from its chord than the sum of the terms that bend it.
+    /// Three of them are tried: the polynomial itself; what is behind its constant term, over
+    /// t, for one that has just left the bound; and what is behind its linear one, over t^2, for
+    /// one that left it with no speed.
     #[inline(always)]
     fn room_above(&self, bound: Lanes<S, V>) -> Lanes<S, V> {
         let zero = bound.zero();
@@ -184,8 +189,8 @@ impl<S: Simd, const V: usize> Path<Lanes<S, V>> {
     }
 }
 
-/// The first instant in (0, `most_s`] at which a polynomial goes from positive to negative, but not before the shortest time of a
-/// mode.
+/// The first instant in (0, `most_s`] at which a polynomial goes from positive to negative, but not
+/// before the shortest time of a mode.
 #[inline(always)]
 fn first_fall(mut room: Polynomial, most_s: f64) -> Option<f64> {
     let soon_s = SHORTEST_MODE_S.min(most_s);
@@ -231,7 +236,8 @@ mod tests {
         (1..=SAMPLES).map(at).find(is_beyond)
     }
 
-    /// A path that is above the lower bound at the step's beginning, by `above`, and touches `lower - depth` at a share of it.
+    /// A path that is above the lower bound at the step's beginning, by `above`, and touches `lower
+    /// - depth` at a share of it.
     fn dip(above: f64, share: f64, depth: f64) -> Vec<f64> {
         let bend = (above + depth) / (share * share);
         vec![above, -2.0 * bend * share, bend]

@@ -1,13 +1,15 @@
-//! Numbers of many motions side by side: `V` vectors of one instruction set, each lane another motion.
+//! Numbers of many motions side by side: `V` vectors of one instruction set, each lane another
+//! motion.
 //!
-//! Loops instead of closures and iterators here and in the steps: an instruction set reaches only code that is inlined into the
-//! function compiled for it, and a closure need not be.
+//! Loops instead of closures and iterators here and in the steps: an instruction set reaches only
+//! code that is inlined into the function compiled for it, and a closure need not be.
 
 use pulp::Simd;
 use std::ops::{Add, Mul, Neg, Sub};
 
-/// One number of each motion. All arithmetic is lane by lane and correctly rounded, multiplication with addition fused, so a
-/// lane's bits depend neither on its neighbours nor on the instruction set.
+/// One number of each motion. All arithmetic is lane by lane and correctly rounded, multiplication
+/// with addition fused, so a lane's bits depend neither on its neighbours nor on the instruction
+/// set.
 ///
 /// Aligned to a line of the cache: the steps wait for loads, and one across two lines counts twice.
 #[derive(Debug, Clone, Copy)]

@@ -50,8 +50,8 @@ pub struct Crossing {
     pub rising: bool,
 }
 
-/// Logarithms of the growth of `K` tangent vectors in one piece, kept at right angles; minus infinity for one that has no length
-/// left.
+/// Logarithms of the growth of `K` tangent vectors in one piece, kept at right angles; minus
+/// infinity for one that has no length left.
 pub type LogStretching<const K: usize> = [f64; K];
 
 /// What is found of a motion.
@@ -71,7 +71,8 @@ pub struct Trajectory<const K: usize> {
     pub upper: [f64; 4],
     /// Growth of the tangent vectors, piece by piece.
     pub log_stretching: Vec<LogStretching<K>>,
-    /// Growth of the first tangent vector since the start, a logarithm, at each turning point of the yaw rate, if that is watched.
+    /// Growth of the first tangent vector since the start, a logarithm, at each turning point of
+    /// the yaw rate, if that is watched.
     pub log_stretching_at_turns: Vec<f64>,
     /// Changes of friction mode.
     pub events: usize,

@@ -62,7 +62,8 @@ impl<const K: usize> LaneData<K> {
     fn at(start: &State<f64>, left_s: f64) -> Self {
         let mut tangents = [[0.5; 4]; K];
         for (k, tangent) in tangents.iter_mut().enumerate() {
-            // Linearly independent, and none along an axis, which may be invariant; a steering that sticks has no rate.
+            // Linearly independent, and none along an axis, which may be invariant; a steering that
+            // sticks has no rate.
             tangent[k] = 1.5;
             if start.friction == FrictionMode::Sticking {
                 tangent[STEERING_RATE] = 0.0;

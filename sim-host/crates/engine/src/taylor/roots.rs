@@ -2,7 +2,8 @@
 
 use super::series::ORDER;
 
-/// Width, as a share of the step, at which an interval with several roots counts as one: a root of higher order.
+/// Width, as a share of the step, at which an interval with several roots counts as one: a root of
+/// higher order.
 const NARROWEST: f64 = 1e-12;
 /// Iterations by which a bracketed root has long been found.
 const MOST_ITERATIONS: usize = 80;
@@ -10,7 +11,8 @@ const MOST_ITERATIONS: usize = 80;
 /// Coefficients of a step's polynomial, the constant one first.
 pub(super) type Polynomial = [f64; ORDER + 1];
 
-/// Value at `t`. Pairs of terms, then pairs of pairs, by Estrin: the processor adds them up side by side.
+/// Value at `t`. Pairs of terms, then pairs of pairs, by Estrin: the processor adds them up side by
+/// side.
 #[inline(always)]
 pub(super) fn value(polynomial: &Polynomial, t: f64) -> f64 {
     const { assert!(ORDER == 12) };
@@ -58,9 +60,10 @@ impl Point {
     }
 }
 
-/// Shows `see` the roots within (0, `end`], ascending, each with whether the polynomial rises there. By Bernstein's form: the signs
-/// of its coefficients bound the number of roots, and where they leave open how many there are, the interval is halved. Roots
-/// where the sign does not change may be left out.
+/// Shows `see` the roots within (0, `end`], ascending, each with whether the polynomial rises
+/// there. By Bernstein's form: the signs of its coefficients bound the number of roots, and where
+/// they leave open how many there are, the interval is halved. Roots where the sign does not change
+/// may be left out.
 #[inline(always)]
 pub(super) fn roots(polynomial: &Polynomial, end: f64, mut see: impl FnMut(f64, bool)) {
     let rate = derivative(polynomial);
@@ -73,7 +76,8 @@ pub(super) fn roots(polynomial: &Polynomial, end: f64, mut see: impl FnMut(f64, 
     let changes = begin.is_below() != last.is_below();
     let bend = derivative(&rate);
     if keeps_its_sign(&rate, end) || (changes && keeps_its_sign(&bend, end)) {
-        // Without a turning point there is one root at most, without an inflection one between two signs.
+        // Without a turning point there is one root at most, without an inflection one between two
+        // signs.
         if changes {
             see(refine(polynomial, &rate, begin, last), begin.is_below());
         }
@@ -162,7 +166,8 @@ fn halves(bernstein: &Polynomial) -> (Polynomial, Polynomial) {
     (left, row)
 }
 
-/// The root between two signs, by Newton from the inverse's cubic within its bracket, and bisection where that leaves it.
+/// The root between two signs, by Newton from the inverse's cubic within its bracket, and bisection
+/// where that leaves it.
 #[inline(always)]
 fn refine(polynomial: &Polynomial, rate: &Polynomial, begin: Point, end: Point) -> f64 {
     let (mut low, mut high) = (begin.t, end.t);

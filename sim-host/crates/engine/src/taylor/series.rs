@@ -23,8 +23,8 @@ pub(super) fn of_lane<S: Simd, const V: usize>(
     coefficients
 }
 
-/// Coefficient `n` of the product of two series. The terms that were known last are added last: the processor has added the
-/// others by then.
+/// Coefficient `n` of the product of two series. The terms that were known last are added last: the
+/// processor has added the others by then.
 #[inline(always)]
 pub(super) fn product<S: Simd, const V: usize>(
     a: &Series<S, V>,
@@ -51,7 +51,8 @@ pub(super) fn inner_product<S: Simd, const V: usize>(
     sum
 }
 
-/// Coefficient `n` of the square of a series, without the term that has its coefficient of order `n`.
+/// Coefficient `n` of the square of a series, without the term that has its coefficient of order
+/// `n`.
 #[inline(always)]
 pub(super) fn inner_square<S: Simd, const V: usize>(a: &Series<S, V>, n: usize) -> Lanes<S, V> {
     let mut sum = a[0].zero();
@@ -65,7 +66,8 @@ pub(super) fn inner_square<S: Simd, const V: usize>(a: &Series<S, V>, n: usize) 
     sum
 }
 
-/// Coefficient `n` of the integral of the product of `rate`'s and `factor`: `rate` has coefficient j of a series times j.
+/// Coefficient `n` of the integral of the product of `rate`'s and `factor`: `rate` has coefficient
+/// j of a series times j.
 #[inline(always)]
 fn integral<S: Simd, const V: usize>(
     rate: &Series<S, V>,

@@ -45,8 +45,8 @@ impl Task {
         })
     }
 
-    /// What all motions of a flight have in common: form of the slip angles, slip angles at which the Magic Formula is worked out (none
-    /// for cubic tyres), and the friction law's argument.
+    /// What all motions of a flight have in common: form of the slip angles, slip angles at which
+    /// the Magic Formula is worked out (none for cubic tyres), and the friction law's argument.
     pub fn form(&self) -> (SlipForm, usize, Option<usize>) {
         let probes = offsets(self.model.tires().0, self.injection).len();
         (self.model.constants().slip_form, probes, self.argument())

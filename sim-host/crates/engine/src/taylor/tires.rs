@@ -38,11 +38,13 @@ pub(super) trait Tires<S: Simd, const V: usize> {
     /// Takes a lane's tyre off.
     fn free_lane(&mut self, lane: usize);
 
-    /// Coefficient `n` of the force, and of its slope if that is asked for, given the slip angle's up to `n`.
+    /// Coefficient `n` of the force, and of its slope if that is asked for, given the slip angle's
+    /// up to `n`.
     fn load(&mut self, n: usize, axle: &mut Axle<S, V>, with_slope: bool);
 }
 
-/// Cubic tyres, softened by the mean of a dither: F = alpha (k1 - k2 alpha^2), dF/dalpha = k1 - 3 k2 alpha^2.
+/// Cubic tyres, softened by the mean of a dither: F = alpha (k1 - k2 alpha^2), dF/dalpha = k1 - 3
+/// k2 alpha^2.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CubicTires<S: Simd, const V: usize> {
     linear: Lanes<S, V>,
@@ -75,7 +77,8 @@ impl<S: Simd, const V: usize> Tires<S, V> for CubicTires<S, V> {
         self.cubic.as_mut_slice()[lane] = 0.0;
     }
 
-    // What the slip angle's newest coefficient adds to the force is one product with the slope: the next order waits for no more.
+    // What the slip angle's newest coefficient adds to the force is one product with the slope: the
+    // next order waits for no more.
     #[inline(always)]
     fn load(&mut self, n: usize, axle: &mut Axle<S, V>, with_slope: bool) {
         let angle = &axle.slip_angle;
@@ -97,8 +100,9 @@ impl<S: Simd, const V: usize> Tires<S, V> for CubicTires<S, V> {
     }
 }
 
-/// Tyres after the Magic Formula (6) and (7), under the mean of a dither: F = D sin(C atan(B (1 - E) alpha + E atan(B alpha))) at
-/// several slip angles about the mean one, all with the same weight.
+/// Tyres after the Magic Formula (6) and (7), under the mean of a dither: F = D sin(C atan(B (1 -
+/// E) alpha + E atan(B alpha))) at several slip angles about the mean one, all with the same
+/// weight.
 #[derive(Debug, Clone)]
 pub(super) struct MagicTires<S: Simd, const V: usize> {
     /// B.
@@ -123,7 +127,8 @@ struct Probe<S: Simd, const V: usize> {
     outer: Atan<S, V>,
     /// Of C times that.
     sine: SinCos<S, V>,
-    /// Derivative of the sine with respect to the outer argument, over C; and of that argument with respect to the angle.
+    /// Derivative of the sine with respect to the outer argument, over C; and of that argument
+    /// with respect to the angle.
     of_sine: Series<S, V>,
     of_argument: Series<S, V>,
 }

@@ -15,7 +15,8 @@ const NEW_FILE: u32 = 0o666;
 pub struct Aside {
     target: PathBuf,
     earlier: Option<Metadata>,
-    /// Its name so far; none where the file system has files without one, which vanish with the process.
+    /// Its name so far; none where the file system has files without one, which vanish with the
+    /// process.
     name: Option<TempPath>,
 }
 
@@ -40,7 +41,8 @@ impl Aside {
     /// The file is complete: it takes its name, and with `force` another's place.
     pub(crate) fn take_name(self, file: &File, force: bool) -> io::Result<()> {
         if let Some(earlier) = &self.earlier {
-            // Only root can give a file away; otherwise the owner changes, as with any editor that renames.
+            // Only root can give a file away; otherwise the owner changes, as with any editor that
+            // renames.
             let _ = fchown(file, Some(earlier.uid()), Some(earlier.gid()));
             file.set_permissions(earlier.permissions())?;
         }

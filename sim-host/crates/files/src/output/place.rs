@@ -73,8 +73,8 @@ pub enum Place {
     },
 }
 
-/// Identity of a file, equal for all of its names: device and inode of the file, or of an existing parent folder together with the
-/// rest of the name.
+/// Identity of a file, equal for all of its names: device and inode of the file, or of an existing
+/// parent folder together with the rest of the name.
 #[derive(Debug, PartialEq)]
 pub struct Identity {
     node: (u64, u64),
@@ -157,7 +157,8 @@ impl Place {
         })
     }
 
-    /// An open descriptor, which is written into even if it is that of a regular file, as its opener requested.
+    /// An open descriptor, which is written into even if it is that of a regular file, as its
+    /// opener requested.
     fn of_descriptor(folder: &Path, name: &OsStr) -> Result<Self, Unwritable> {
         check_descriptor(folder, name)?;
         let path = folder.join(name);
@@ -202,7 +203,8 @@ pub fn stdout() -> io::Result<File> {
 
 /// Opens a descriptor, or a destination that is not a regular file, for writing.
 pub(crate) fn open_stream(path: &Path) -> io::Result<File> {
-    // A terminal must not become the controlling terminal, and the content of a descriptor's file is kept.
+    // A terminal must not become the controlling terminal, and the content of a descriptor's file
+    // is kept.
     let flags = OFlags::NOCTTY | OFlags::APPEND;
     OpenOptions::new()
         .append(true)

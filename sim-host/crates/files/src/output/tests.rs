@@ -231,7 +231,8 @@ fn a_failed_write_leaves_the_earlier_file_and_nothing_else() {
 
 #[test]
 fn a_pipe_is_written_into_without_force() {
-    // A pipe each: a process that another test is about to start may hold an earlier reader for a moment.
+    // A pipe each: a process that another test is about to start may hold an earlier reader for a
+    // moment.
     for name in ["d", "link"] {
         let at = tempdir().unwrap();
         let path = at.path().join("d");
@@ -249,7 +250,8 @@ fn a_pipe_is_written_into_without_force() {
     }
 }
 
-/// A device's node that the test may lose; those of the system only for users who could not replace them.
+/// A device's node that the test may lose; those of the system only for users who could not replace
+/// them.
 fn device(at: &Path, name: &str, minor: &str) -> PathBuf {
     let own = at.join(name);
     let made = Command::new("mknod")

@@ -272,7 +272,8 @@ listed! {
 pub struct Fault {
     /// Kind of fault.
     pub kind: Kind,
-    /// Duration in control ticks; `None` if permanent. The kind of a timing fault gives its duration.
+    /// Duration in control ticks; `None` if permanent. The kind of a timing fault gives its
+    /// duration.
     pub ticks: Option<u32>,
 }
 

@@ -58,7 +58,8 @@ pub struct FaultFree {
 }
 
 impl FaultFree {
-    /// Runs the manoeuvre to its end. Faults will be injected at `times_s` from its start; times after its end are ignored.
+    /// Runs the manoeuvre to its end. Faults will be injected at `times_s` from its start; times
+    /// after its end are ignored.
     ///
     /// # Errors
     /// If the scenario or the manoeuvre is invalid.
@@ -142,7 +143,8 @@ impl FaultFree {
     }
 }
 
-/// Injects every fault at every time of every manoeuvre, in parallel. `on_run` is called after each run.
+/// Injects every fault at every time of every manoeuvre, in parallel. `on_run` is called after each
+/// run.
 ///
 /// # Errors
 /// If the user interrupts the campaign.

@@ -55,7 +55,8 @@ impl Detector {
 pub struct Detection {
     /// The detector.
     pub detector: Detector,
-    /// Control ticks from the injection to the detection. The ECU's frame that reports it is sent one tick later.
+    /// Control ticks from the injection to the detection. The ECU's frame that reports it is sent
+    /// one tick later.
     pub latency_ticks: u32,
 }
 
@@ -96,7 +97,8 @@ pub enum Verdict {
     Detected,
     /// Detected, and the ECU continued.
     Tolerated,
-    /// No diagnostic is raised. All outputs are bit-identical to the fault-free run, and no corrupted value is live.
+    /// No diagnostic is raised. All outputs are bit-identical to the fault-free run, and no
+    /// corrupted value is live.
     NoEffect,
     /// No diagnostic is raised, but an output differs or a corrupted value is live.
     Undetected,
@@ -166,7 +168,8 @@ impl Judge {
         }
     }
 
-    /// Observes a completed PWM period: the ECU's packet, its packet in the fault-free run, and the vehicle.
+    /// Observes a completed PWM period: the ECU's packet, its packet in the fault-free run, and the
+    /// vehicle.
     pub fn observe(&mut self, from_ecu: &Packet, fault_free: &Packet, vehicle: &VehicleNode) {
         self.differs |= from_ecu.duty_code != fault_free.duty_code;
         let (now, expected) = (actuation(from_ecu), actuation(fault_free));

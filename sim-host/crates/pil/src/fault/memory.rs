@@ -17,8 +17,9 @@ const CONTROL_TASK: &str = "in_loop13place_control";
 const PWM_TASK: &str = "in_loop9place_pwm";
 const MAILBOXES: [&str; 2] = ["in_loop5INPUT", "in_loop6OUTPUT"];
 
-/// `count` flips in each region, at random ticks in `ticks`. The probability of a variable is proportional to its size. A size
-/// above 64 bytes counts as 64 bytes, because most of the memory is buffers that the loop does not use.
+/// `count` flips in each region, at random ticks in `ticks`. The probability of a variable is
+/// proportional to its size. A size above 64 bytes counts as 64 bytes, because most of the memory
+/// is buffers that the loop does not use.
 pub fn flips(image: &Image, count: usize, ticks: Range<u32>) -> Vec<ProcessorFault> {
     let mut generator = Pcg64Mcg::seed_from_u64(SEED);
     let mut below = |bound: u32| (generator.next_u64() % u64::from(bound.max(1))) as u32;

@@ -1,4 +1,5 @@
-//! Fault injection: faults are injected into the loop, and every run is compared with its fault-free run.
+//! Fault injection: faults are injected into the loop, and every run is compared with its
+//! fault-free run.
 //!
 //! | question | module |
 //! |---|---|

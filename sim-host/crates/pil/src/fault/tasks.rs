@@ -1,4 +1,5 @@
-//! The ECU's program on the host. Its two tasks are scheduled as by the firmware's interrupts, which can fail.
+//! The ECU's program on the host. Its two tasks are scheduled as by the firmware's interrupts,
+//! which can fail.
 
 use super::catalogue::TimingFailure;
 use shared_model::ecu::{ControlInput, ControlOutput, ControlTask, Ecu, PwmTask};

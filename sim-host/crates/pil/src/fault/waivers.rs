@@ -1,10 +1,12 @@
-//! Waivers: faults that may stay undetected, each with its rationale. Any other undetected fault fails the campaign.
+//! Waivers: faults that may stay undetected, each with its rationale. Any other undetected fault
+//! fails the campaign.
 
 use super::catalogue::{Fault, Kind, SensorFailure, ServoFailure, Signal};
 use super::injection::Injection;
 use super::processor_fault::{Action, ProcessorFault};
 
-/// Greatest step of the wheel speed that is plausible for a vehicle, as a share of its range: 20 of 2500 rpm.
+/// Greatest step of the wheel speed that is plausible for a vehicle, as a share of its range: 20 of
+/// 2500 rpm.
 const WHEEL_SPEED_SHARE: f32 = 0.008;
 /// The same for a signal that does not enter a command.
 const MONITORED_SHARE: f32 = 0.03;

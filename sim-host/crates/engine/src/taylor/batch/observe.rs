@@ -9,7 +9,8 @@ use crate::taylor::series::{ORDER, Series, of_lane, value};
 use pulp::Simd;
 use shared_model::vehicle::YAW_RATE;
 
-/// A rate of change below this (in the component's unit a second) is rounding, which has turning points of its own.
+/// A rate of change below this (in the component's unit a second) is rounding, which has turning
+/// points of its own.
 const RATE_FLOOR: f64 = 1e-13;
 
 impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Batch<'a, S, V, K, E> {

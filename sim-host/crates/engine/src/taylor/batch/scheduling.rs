@@ -10,8 +10,8 @@ use pulp::Simd;
 use shared_model::vehicle::State;
 
 impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Batch<'a, S, V, K, E> {
-    /// The last motions take turns in the lanes: the one furthest ahead waits for the one furthest behind, so that all end together and
-    /// no lane is empty for long.
+    /// The last motions take turns in the lanes: the one furthest ahead waits for the one furthest
+    /// behind, so that all end together and no lane is empty for long.
     #[inline(never)]
     pub(super) fn take_turns(&mut self) {
         if !(1..=self.lanes.len()).contains(&self.queue.len()) {

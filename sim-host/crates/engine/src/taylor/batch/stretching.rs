@@ -11,7 +11,8 @@ const LENGTHS_SQUARED: (f64, f64) = (1e-200, 1e200);
 const LOST_SQUARED: f64 = 1e-24;
 
 impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Batch<'a, S, V, K, E> {
-    /// Keeps a single tangent vector within the range of numbers; several at right angles and of length one, by Gram and Schmidt.
+    /// Keeps a single tangent vector within the range of numbers; several at right angles and of
+    /// length one, by Gram and Schmidt.
     #[inline(always)]
     pub(super) fn keep_tangents_finite(&mut self) {
         if K == 0 {
@@ -75,7 +76,8 @@ impl<'a, S: Simd, const V: usize, const K: usize, E: Equation> Batch<'a, S, V, K
         }
     }
 
-    /// Adds what a lane's tangent vectors have grown by to its growth, and goes on with unit vectors.
+    /// Adds what a lane's tangent vectors have grown by to its growth, and goes on with unit
+    /// vectors.
     #[inline(never)]
     pub(super) fn accumulate_stretching(&mut self, lane: usize) {
         let Some(motion) = &mut self.lanes[lane] else {

@@ -84,7 +84,8 @@ impl Bench {
         })
     }
 
-    /// A short manoeuvre whose dither is on after about 50 control ticks. Up to the fault the core is stopped at each tick.
+    /// A short manoeuvre whose dither is on after about 50 control ticks. Up to the fault the core
+    /// is stopped at each tick.
     ///
     /// # Errors
     /// As [`new`](Self::new).
@@ -205,8 +206,8 @@ impl Bench {
         Ok(row(&Injection::Processor(fault), &setting, &outcome))
     }
 
-    /// Injects a fault between vehicle and ECU into the ECU's program on the host and into the firmware. Returns the packets of
-    /// each, one per PWM period.
+    /// Injects a fault between vehicle and ECU into the ECU's program on the host and into the
+    /// firmware. Returns the packets of each, one per PWM period.
     ///
     /// # Errors
     /// If the emulator cannot be run.

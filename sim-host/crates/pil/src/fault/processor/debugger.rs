@@ -1,4 +1,5 @@
-//! Manipulation of the firmware through the emulator's gdb stub and QMP: breakpoints, registers, memory.
+//! Manipulation of the firmware through the emulator's gdb stub and QMP: breakpoints, registers,
+//! memory.
 
 use super::addresses::Addresses;
 use crate::fault::processor_fault::Action;
@@ -82,7 +83,8 @@ impl Debugger<'_> {
     fn run_to_tick(&self, gdb: &mut Gdb, tick: u32) -> Result<(), SocketError> {
         let interrupt = self.addresses.control_interrupt;
         gdb.set_breakpoint(interrupt)?;
-        // An interrupt that is preempted at its first instruction stops there twice, so stops cannot be counted.
+        // An interrupt that is preempted at its first instruction stops there twice, so stops
+        // cannot be counted.
         while self.finished_ticks(gdb)? + 1 < tick || gdb.read_register(Register::Pc)? != interrupt
         {
             self.run_to_stop(gdb)?;
@@ -97,8 +99,8 @@ impl Debugger<'_> {
         gdb.remove_breakpoint(self.addresses.pwm_interrupt)
     }
 
-    /// From the start of the control interrupt, runs to one of its instructions: the first that is reached of several that `seed`
-    /// selects. If none is reached, it runs to the main loop.
+    /// From the start of the control interrupt, runs to one of its instructions: the first that is
+    /// reached of several that `seed` selects. If none is reached, it runs to the main loop.
     fn run_into_control_interrupt(&self, gdb: &mut Gdb, seed: u32) -> Result<(), SocketError> {
         let Addresses {
             control_interrupt,
