@@ -274,7 +274,7 @@ fn what_is_no_setting_is_refused_before_anything_starts() {
         ("friction.law=sticky", "coulomb_rate"),
         ("preset=papre", "reconstruction, printed"),
         ("=1", "unknown key"),
-        ("run.duration_s=1 x=2", "no blanks"),
+        ("run.duration_s=1 x=2", "must not contain spaces"),
     ] {
         let folder = fake(&format!("touch {marker}; exit 0"));
         let arguments = [
