@@ -1,8 +1,8 @@
 //! The contents of a report: checks, runs on the ECU, manoeuvres, recorded texts.
 
 use dynamics::trace::Trace;
+use pil::closed_loop::Run;
 use pil::instructions::Instructions;
-use pil::run::Run;
 use plot::verdict::Verdict;
 
 /// One run on the ECU.

@@ -4,10 +4,10 @@
 use super::checks::load;
 use super::job::{Options, Progress, VerifyError};
 use crate::report::DriveReport;
+use pil::comparison::Comparison;
 use pil::instructions::Instructions;
-use pil::levels::{Levels, Target, drive};
 use pil::manoeuvre::Manoeuvre;
-use pil::run::Comparison;
+use pil::mil_sil_pil::{LoopError, MilSilPil, Target, run_all};
 use plot::verdict::Check;
 use qemu::session::LinkKind;
 use qemu::{Machine, RunError};
@@ -52,8 +52,8 @@ fn one(
         link: LinkKind::Files,
         time_out: options.time_out,
     };
-    let levels = drive(&scenario, &manoeuvre, &target, || {}).map_err(|source| {
-        if matches!(source, pil::levels::LevelError::Run(RunError::Interrupted)) {
+    let levels = run_all(&scenario, &manoeuvre, &target, || {}).map_err(|source| {
+        if matches!(source, LoopError::Run(RunError::Interrupted)) {
             return VerifyError::Interrupted;
         }
         VerifyError::InLoop {
@@ -75,7 +75,7 @@ fn one(
     Ok((checks, report))
 }
 
-fn checks(id: &str, levels: &Levels) -> Vec<Check> {
+fn checks(id: &str, levels: &MilSilPil) -> Vec<Check> {
     let equal = |what: &str, title: &str, comparison: &Comparison| {
         let different = comparison.different_duties + comparison.different_frames;
         let detail = match comparison.first {

@@ -76,7 +76,7 @@ pub enum VerifyError {
         /// The manoeuvre.
         title: String,
         /// Why.
-        source: Box<pil::levels::LevelError>,
+        source: Box<pil::mil_sil_pil::LoopError>,
     },
     /// No place for telemetry.
     #[error("cannot make a temporary folder: {0}")]
