@@ -101,7 +101,7 @@ pub struct Series {
     pub look: Look,
 }
 
-/// More dots than this are drawn small: so many large ones would hide each other.
+/// More dots than this are drawn small: large ones in such a number would hide each other.
 const MOST_LARGE_DOTS: usize = 3000;
 /// Colours of dots before they repeat.
 const COLOURS: usize = 4;
