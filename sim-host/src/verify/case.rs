@@ -80,7 +80,7 @@ pub(super) struct Outcome {
     pub(super) recording: Recording,
     pub(super) log: Vec<String>,
     pub(super) firmware: Trace,
-    /// Index of the first state behind the transient of the dither.
+    /// Index of the first state after the transient of the dither.
     pub(super) settled: usize,
     pub(super) bits: Bits,
     /// Levels 2 to 4, where they are asked for.

@@ -15,7 +15,7 @@ use shared_model::{InvalidScenario, Scenario};
 /// What [`observe`](crate::observe::observe) finds of a motion. Changes of friction mode are not
 /// counted.
 ///
-/// Extents are those of the states behind the steps, turning points and crossings interpolated
+/// Extents are those of the states after the steps, turning points and crossings interpolated
 /// between them.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! What motions do behind their transients: by the engine, many side by side.
+//! What motions do after their transients: by the engine, many side by side.
 
 use crate::fixed_step;
 use crate::lyapunov::{SEGMENTS, WARM_UP};
@@ -72,7 +72,7 @@ pub fn is_supported(scenario: &Scenario<f64>) -> Result<bool, InvalidScenario> {
     Ok(model.friction_sign(injection) == Sign::Zero || model.can_stick(injection))
 }
 
-/// What is found of motions behind their transients by the engine, as in [`observe`].
+/// What is found of motions after their transients by the engine, as in [`observe`].
 ///
 /// # Errors
 /// If a scenario is not valid, or the engine cannot follow it.

@@ -113,7 +113,7 @@ pub struct Point {
 /// The orbit diagram. Points are in ascending order of the parameter; those not begun are left out.
 ///
 /// From a fixed start the points are independent and made side by side; a continued diagram is made
-/// in sequence, and behind a motion that diverged it begins anew at the scenario's start. Memory
+/// in sequence, and after a motion that diverged it begins anew at the scenario's start. Memory
 /// grows with the number of points shown, not with the length of the runs. Time grows with the
 /// number of values times the length of a run.
 ///

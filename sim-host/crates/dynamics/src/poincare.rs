@@ -57,7 +57,7 @@ impl From<Unsettled> for SectionError {
 }
 
 /// Crossings of the section by the motion of a scenario, its dither on from the start, within its
-/// length behind a transient of `transient_s`.
+/// length after a transient of `transient_s`.
 ///
 /// # Errors
 /// If the scenario is not valid, the motion diverges, or it never crosses the section.
@@ -193,7 +193,7 @@ fn by_steps(
     Ok(passage)
 }
 
-/// Hands the steps behind the transient to `visit`, each with the time of its start (s). Nothing is
+/// Hands the steps after the transient to `visit`, each with the time of its start (s). Nothing is
 /// kept, so that a run may be long.
 fn for_each_step(
     scenario: &Scenario<f64>,

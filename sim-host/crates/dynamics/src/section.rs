@@ -74,7 +74,7 @@ pub struct Crossing {
 pub struct Step {
     /// State before it.
     pub start: State<f64>,
-    /// State behind it.
+    /// State after it.
     pub end: State<f64>,
     /// Its length, s.
     pub step_s: f64,

@@ -104,7 +104,7 @@ pub enum SweepError {
         /// What is wrong, with bounds.
         fault: &'static str,
     },
-    /// Nothing of the run is left behind the transient.
+    /// Nothing of the run is left after the transient.
     #[error(
         "a run of {} s with a transient of {} s: the transient must be at least 0 and shorter than the run",
         Short(*.time_s), Short(*.transient_s)

@@ -1,4 +1,4 @@
-//! What motions do behind their transients: by the engine, against the reference integrator and
+//! What motions do after their transients: by the engine, against the reference integrator and
 //! against the ECU's fixed step.
 
 use dynamics::attractor::{Kind, attractor};

@@ -5,7 +5,7 @@
 //! extrapolated to high order (Bulirsch and Stoer; E. Hairer, S. P. Norsett, G. Wanner, Solving
 //! Ordinary Differential Equations I, section II.9), each step being halved until two successive
 //! orders agree. Where an event lies within a step, its instant is found by integrating
-//! to trial instants, and the motion goes on from there in the new mode. What the ECU's fixed step
+//! to trial instants, and the motion continues from there in the new mode. What the ECU's fixed step
 //! makes of the same motion is compared against it.
 
 use crate::dual::Dual;

@@ -248,7 +248,7 @@ fn sealed(text: &str) -> String {
     )
 }
 
-/// A file with its check sum made right: for those that test what lies behind it.
+/// A file with its check sum made right: for those that test what follows it.
 #[doc(hidden)]
 pub fn resealed(tile: &str) -> String {
     sealed(tile.split_once('\n').map_or("", |(_, text)| text))

@@ -23,7 +23,7 @@ pub struct Span {
     pub observables: Observables,
     /// Time in which the tangent vectors turn into their directions, s.
     pub warm_up_s: f64,
-    /// Pieces of equal length behind it, each with the growth of the tangent vectors in it.
+    /// Pieces of equal length after it, each with the growth of the tangent vectors in it.
     pub segments: usize,
 }
 
