@@ -28,9 +28,14 @@ fn main() {
         println!("cargo:rustc-link-arg-bins={argument}");
     }
     // Not for `panic-free`: defmt's script keeps its panic handler in the image, reachable or not.
-    for image in ["ecu", "fault-drill"] {
+    for image in ["ecu", "bench"] {
         println!("cargo:rustc-link-arg-bin={image}=-Tdefmt.x");
     }
+    // The product's configuration in a section of its own.
+    let script = "src/product/configuration.x";
+    fs::copy(script, out.join("configuration.x")).expect("the script is readable");
+    println!("cargo:rerun-if-changed={script}");
+    println!("cargo:rustc-link-arg-bin=ecu=-Tconfiguration.x");
     // Without a level at build time, defmt drops everything below errors.
     println!("cargo:rustc-env=DEFMT_LOG=info");
 }

@@ -109,7 +109,7 @@ fn every_duty_is_in_the_timers_register() {
 fn memory_is_read_and_written() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let mut run = start(&scenario(Waveform::None), folder.path());
-    let image = board_image(STM32F405.board(), "ecu");
+    let image = board_image(STM32F405.board(), "bench");
     let free = image.address_of("__sheap").expect("RAM ends somewhere");
     let free = free.next_multiple_of(4);
     let gdb = &mut run.gdb;
@@ -125,7 +125,7 @@ fn memory_is_read_and_written() {
 fn core_registers_are_read_and_written() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let mut run = start(&scenario(Waveform::None), folder.path());
-    let image = board_image(STM32F405.board(), "ecu");
+    let image = board_image(STM32F405.board(), "bench");
     let top = image.address_of("_stack_start");
     assert_eq!(run.gdb.read_register(Register::Sp).ok(), top);
     let interrupt = to_interrupt(&mut run);
@@ -155,7 +155,7 @@ fn the_end_of_the_program_is_a_stop() {
 #[test]
 fn a_core_that_does_not_stop_is_a_time_out() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    let image = board_image(STM32F405.board(), "fault-drill");
+    let image = board_image(STM32F405.board(), "bench");
     let hang = ["fault=hang".to_owned()];
     let mut run = Debugged::start(&image, STM32F405, &hang, folder.path(), TIME_OUT)
         .unwrap_or_else(|error| panic!("{error}"));
@@ -167,7 +167,7 @@ fn a_core_that_does_not_stop_is_a_time_out() {
 fn a_scenario_for_another_timer_is_refused() {
     for (machine, timer_clock_hz) in [(STM32F405, "25000000"), (Machine::Mps2An386, "16000000")] {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let image = board_image(machine.board(), "ecu");
+        let image = board_image(machine.board(), "bench");
         let setting = format!("servo.timer_clock_hz={timer_clock_hz}");
         let finished = run(&image, machine, &[setting], folder.path(), TIME_OUT)
             .unwrap_or_else(|error| panic!("{error}"));
@@ -183,7 +183,7 @@ fn a_scenario_for_another_timer_is_refused() {
 #[test]
 fn without_a_word_about_it_the_timer_is_the_boards() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    let image = board_image(STM32F405.board(), "ecu");
+    let image = board_image(STM32F405.board(), "bench");
     let settings = [
         "preset=printed",
         "run.duration_s=0.1",
@@ -202,7 +202,7 @@ fn without_a_word_about_it_the_timer_is_the_boards() {
 fn faults_put_the_timer_to_neutral() {
     for (fault, exit_code) in [("panic", 13), ("hard-fault", 14), ("stack-overflow", 14)] {
         let folder = tempfile::tempdir().expect("a temporary folder can be made");
-        let image = board_image(STM32F405.board(), "fault-drill");
+        let image = board_image(STM32F405.board(), "bench");
         let finished = run(
             &image,
             STM32F405,
@@ -226,7 +226,7 @@ fn faults_put_the_timer_to_neutral() {
 fn every_image_fits_its_board() {
     for board in BOARDS {
         let map = memory_map(board);
-        for name in ["ecu", "fault-drill"] {
+        for name in ["ecu", "bench"] {
             let image = board_image(board, name);
             let [flash, stack, ram] = ["FLASH", "STACK", "RAM"].map(|name| region(&map, name));
             let start = image.address_of("__vector_table").map(u64::from);
@@ -261,7 +261,7 @@ fn no_board_is_left_out() {
 
 /// The ECU with a scenario, before its first instruction.
 fn start(scenario: &Scenario<f32>, folder: &Path) -> Debugged {
-    let image = board_image(STM32F405.board(), "ecu");
+    let image = board_image(STM32F405.board(), "bench");
     let mut settings = settings::of(scenario);
     settings.push(format!("telemetry={TELEMETRY}"));
     Debugged::start(&image, STM32F405, &settings, folder, TIME_OUT)
@@ -270,7 +270,7 @@ fn start(scenario: &Scenario<f32>, folder: &Path) -> Debugged {
 
 /// Continues to the first PWM interrupt and returns its address, with a breakpoint there.
 fn to_interrupt(run: &mut Debugged) -> u32 {
-    let image = board_image(STM32F405.board(), "ecu");
+    let image = board_image(STM32F405.board(), "bench");
     let interrupt = image.address_of("SysTick").expect("it has the interrupt");
     run.gdb
         .set_breakpoint(interrupt)

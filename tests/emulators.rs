@@ -48,7 +48,7 @@ fn ended(output: &Output) -> (Option<i32>, String) {
 }
 
 fn ecu() -> String {
-    image("ecu").path.to_string_lossy().into_owned()
+    image("bench").path.to_string_lossy().into_owned()
 }
 
 #[track_caller]
@@ -227,7 +227,7 @@ fn the_emulator_ends_with_this_program() {
 #[test]
 fn an_image_without_symbols_runs_without_log() {
     let real = tempfile::tempdir().expect("a temporary folder can be made");
-    let mut bytes = image("ecu").bytes;
+    let mut bytes = image("bench").bytes;
     // e_shoff, then e_shnum and e_shstrndx of an ELF of 32 bits.
     bytes[0x20..0x24].fill(0);
     bytes[0x30..0x34].fill(0);

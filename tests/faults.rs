@@ -23,7 +23,7 @@ fn each_fault_neutralises_the_pwm_and_has_its_exit_code() {
         for machine in [Machine::Mps2An386, Machine::Mps2An500] {
             let folder = tempfile::tempdir().expect("a temporary folder can be made");
             let finished = run(
-                &image("fault-drill"),
+                &image("bench"),
                 machine,
                 &[format!("fault={fault}")],
                 folder.path(),
@@ -54,7 +54,7 @@ fn a_firmware_that_hangs_is_stopped_and_gone() {
     let start = Instant::now();
     let settings = ["fault=hang".into(), marker.clone()];
     let error = run(
-        &image("fault-drill"),
+        &image("bench"),
         Machine::Mps2An386,
         &settings,
         folder.path(),
@@ -72,7 +72,7 @@ fn the_runner_says_that_a_firmware_hangs_and_passes_exit_codes_on() {
     let drill = |arguments: &[&str]| {
         let output = Command::new(sim_host())
             .args(["firmware", "run", "--time-out", "2"])
-            .arg(image("fault-drill").path)
+            .arg(image("bench").path)
             .args(arguments)
             .current_dir(folder.path())
             .output()

@@ -32,7 +32,7 @@ fn manoeuvre(file: &str, duration_s: f64) -> (Scenario<f64>, Manoeuvre) {
 
 fn target(machine: Machine, link: LinkKind) -> Target {
     Target {
-        image: board_image(machine.board(), "ecu"),
+        image: board_image(machine.board(), "bench"),
         machine,
         link,
         time_out: Duration::from_secs(60),
@@ -114,20 +114,6 @@ fn every_link_and_board_gives_the_same_commands() {
     }
 }
 
-/// Some hundred exchanges: each takes the emulator a millisecond.
-#[test]
-fn the_uart_carries_the_same_commands() {
-    let mut scenario = Scenario::reconstruction();
-    scenario.run.duration_s = 0.05;
-    scenario.dither.waveform = Waveform::Square;
-    scenario.dither.start_time_s = 0.0;
-    // A small request, so that the lead-in is short.
-    let manoeuvre = Manoeuvre::constant(1750.0, 0.1);
-    let target = target(Machine::Mps2An386, LinkKind::Uart);
-    let runs = run_all(&scenario, &manoeuvre, &target, || {}).expect("it can be driven");
-    assert_agree(&runs);
-}
-
 #[test]
 fn two_runs_and_a_replay_give_the_same_bytes() {
     let (first, second) = (on_target(LinkKind::Files), on_target(LinkKind::Files));
@@ -197,7 +183,7 @@ fn a_firmware_that_dies_or_refuses_is_said() {
     let start = |options: &[&str], settings: &[String]| {
         let limit = Duration::from_secs(3);
         let machine = Machine::Mps2An386;
-        let image = image("ecu");
+        let image = image("bench");
         Session::start(&image, machine, settings, LinkKind::Files, options, limit)
     };
     let refused = start(&[], &["dither.amplitude_v=-1".into()]);

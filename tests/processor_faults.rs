@@ -21,7 +21,7 @@ const FLIPS: usize = 5;
 
 fn target() -> Target {
     Target {
-        image: image("ecu"),
+        image: image("bench"),
         machine: Machine::Mps2An386,
         link: LinkKind::Timed,
         time_out: TIME_OUT,

@@ -17,9 +17,10 @@ use shared_model::vehicle::SlipForm;
 use sim_host::firmware::PRIORITIES;
 use std::fs;
 use tests::golden::{Figure, check_figures};
-use tests::{TIME_OUT, board_image, framed_image, image, record, root, scenario};
+use tests::{TIME_OUT, board_image, image, record, root, scenario};
 
 const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
+const IMAGES: [&str; 2] = ["ecu", "bench"];
 /// Memory that the ECU's program may use on any board, bytes: limits of this project, far below
 /// what the boards have.
 const STACK_LIMIT_BYTES: u32 = 16 * 1024;
@@ -27,6 +28,13 @@ const FLASH_LIMIT_BYTES: u32 = 128 * 1024;
 const RAM_LIMIT_BYTES: u32 = 64 * 1024;
 /// Spread of the time between PWM interrupts, counts of 40 ns.
 const JITTER_LIMIT_COUNTS: u32 = 25;
+
+/// Every image of every board.
+fn images() -> impl Iterator<Item = (&'static str, &'static str)> {
+    BOARDS
+        .into_iter()
+        .flat_map(|board| IMAGES.map(|image| (board, image)))
+}
 
 fn memory_map(board: &str) -> Map {
     let path = root()
@@ -37,17 +45,17 @@ fn memory_map(board: &str) -> Map {
     Map::parse(&text).unwrap_or_else(|error| panic!("{board}: {error}"))
 }
 
-fn proven_stack(board: &str, framed: &Image) -> Stack {
-    let stack = Stack::analyse(&framed.bytes, &PRIORITIES)
-        .unwrap_or_else(|error| panic!("{board}: {error}"));
+fn proven_stack(place: &str, image: &Image) -> Stack {
+    let stack = Stack::analyse(&image.bytes, &PRIORITIES)
+        .unwrap_or_else(|error| panic!("{place}: {error}"));
     assert_eq!(
         stack.problems,
         [] as [&str; 0],
-        "{board}: there is no bound"
+        "{place}: there is no bound"
     );
     assert!(
         stack.fits(),
-        "{board}: {} of {} bytes",
+        "{place}: {} of {} bytes",
         stack.worst_bytes,
         stack.room_bytes
     );
@@ -58,57 +66,45 @@ fn proven_stack(board: &str, framed: &Image) -> Stack {
 fn worst_stack() {
     let mut figures = Vec::new();
     let mut compiler = String::new();
-    for board in BOARDS {
-        let framed = framed_image(board);
-        let stack = proven_stack(board, &framed);
+    for (board, name) in images() {
+        let image = board_image(board, name);
+        let place = format!("{board}/{name}");
+        let stack = proven_stack(&place, &image);
         // Two independent sources: the compiler's figures, and the instructions.
         assert!(
             10 * stack.confirmed_functions >= 9 * stack.stated_functions,
-            "{board}: {} of {} frames confirmed",
+            "{place}: {} of {} frames confirmed",
             stack.confirmed_functions,
             stack.stated_functions
         );
         for level in &stack.levels {
-            let name = format!("{board}/{}", level.name.replace(' ', "-"));
+            let name = format!("{place}/{}", level.name.replace(' ', "-"));
             figures.push(Figure::new(name, level.bytes, "bytes"));
         }
         let saved = stack.exception_frames_bytes;
         figures.push(Figure::new(
-            format!("{board}/saved-by-the-core"),
+            format!("{place}/saved-by-the-core"),
             saved,
             "bytes",
         ));
-        let worst = Figure::new(format!("{board}/worst"), stack.worst_bytes, "bytes");
+        let worst = Figure::new(format!("{place}/worst"), stack.worst_bytes, "bytes");
         figures.push(worst.at_most(STACK_LIMIT_BYTES));
         figures.push(Figure::new(
-            format!("{board}/room"),
+            format!("{place}/room"),
             stack.room_bytes,
             "bytes",
         ));
-        compiler = framed.compiler;
+        compiler = image.compiler;
     }
-    let about = "Worst stack of the ECU on each board: levels that interrupt each other, their sum, and the RAM for it.";
+    let about = "Worst stack of both images on each board: levels that interrupt each other, their sum, and the RAM for it.";
     check_figures("stack.txt", about, &compiler, &figures);
-}
-
-/// The image whose stack is analysed has the code of the one that runs.
-#[test]
-fn the_analysed_image_is_the_one_that_runs() {
-    for board in BOARDS {
-        let (framed, runs) = (framed_image(board), board_image(board, "ecu"));
-        assert_eq!(
-            (framed.flash_bytes, framed.ram_bytes),
-            (runs.flash_bytes, runs.ram_bytes),
-            "{board}: run `cargo xtask proofs`"
-        );
-    }
 }
 
 /// Nothing that was ever measured is deeper than the bound, and the bound is not from another
 /// world.
 #[test]
 fn no_run_is_deeper_than_the_bound() {
-    let bound = proven_stack("mps2", &framed_image("mps2")).worst_bytes;
+    let bound = proven_stack("mps2", &image("bench")).worst_bytes;
     let mut scenarios = Vec::new();
     for waveform in [Waveform::None, Waveform::Square, Waveform::Sine] {
         scenarios.push(scenario(waveform, Application::Averaged));
@@ -137,11 +133,12 @@ fn no_run_is_deeper_than_the_bound() {
 fn flash_and_ram() {
     let mut figures = Vec::new();
     let mut compiler = String::new();
-    for board in BOARDS {
+    for (board, name) in images() {
         let map = memory_map(board);
-        let image = board_image(board, "ecu");
-        assert!(image.flash_bytes <= map.flash_bytes, "{board}: flash");
-        assert!(image.ram_bytes <= map.ram_bytes, "{board}: RAM");
+        let image = board_image(board, name);
+        let place = format!("{board}/{name}");
+        assert!(image.flash_bytes <= map.flash_bytes, "{place}: flash");
+        assert!(image.ram_bytes <= map.ram_bytes, "{place}: RAM");
         for (what, bytes, limit, there) in [
             (
                 "flash",
@@ -151,10 +148,10 @@ fn flash_and_ram() {
             ),
             ("ram", image.ram_bytes, RAM_LIMIT_BYTES, map.ram_bytes),
         ] {
-            let taken = Figure::new(format!("{board}/{what}"), bytes as u32, "bytes");
+            let taken = Figure::new(format!("{place}/{what}"), bytes as u32, "bytes");
             figures.push(taken.at_most(limit));
             figures.push(Figure::new(
-                format!("{board}/{what}-there-is"),
+                format!("{place}/{what}-there-is"),
                 there as u32,
                 "bytes",
             ));
@@ -162,7 +159,7 @@ fn flash_and_ram() {
         compiler = image.compiler;
     }
     let about =
-        "Flash and RAM (without stack) that the ECU takes of each board, and what the board has.";
+        "Flash and RAM (without stack) that each image takes of its board, and what the board has.";
     check_figures("sizes.txt", about, &compiler, &figures);
 }
 
@@ -180,7 +177,7 @@ fn no_panic_is_in_the_panic_free_image() {
             .filter(|name| name.contains("panic"))
             .collect();
         assert_eq!(panics, [] as [&str; 0], "{board}");
-        let others = function_names(&board_image(board, "ecu"));
+        let others = function_names(&board_image(board, "bench"));
         assert!(
             others.iter().any(|name| name.contains("panic")),
             "the ECU's image has a handler at least"
@@ -210,7 +207,7 @@ fn drive() -> Instructions {
         manoeuvre::load(&file).unwrap_or_else(|error| panic!("{error}"));
     scenario.run.duration_s = 5.0;
     let target = Target {
-        image: image("ecu"),
+        image: image("bench"),
         machine: Machine::Mps2An386,
         link: LinkKind::Files,
         time_out: TIME_OUT,
@@ -241,7 +238,12 @@ fn instructions_per_tick() {
     figures.extend(instruction_figures("in-loop/square", &drive()));
     let about = "Instructions (no cycles) of the tasks on the board mps2: median and most of the control task and of the slowest PWM\n\
                  task of a tick, and the share of a tick that both take at worst. The dither sets in on the way.";
-    check_figures("instructions.txt", about, &image("ecu").compiler, &figures);
+    check_figures(
+        "instructions.txt",
+        about,
+        &image("bench").compiler,
+        &figures,
+    );
 }
 
 /// PWM interrupts, at least, at each rate.
@@ -274,5 +276,5 @@ fn jitter_of_interrupts() {
     }
     let about = "Counts of 40 ns of an independent timer between PWM interrupts, over 100,000 of them at each rate, while the control task\n\
                  works; in the emulator's time, in which an instruction takes 32 ns. That is no measurement of silicon.";
-    check_figures("jitter.txt", about, &image("ecu").compiler, &figures);
+    check_figures("jitter.txt", about, &image("bench").compiler, &figures);
 }

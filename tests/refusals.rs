@@ -13,7 +13,7 @@ fn outcome(settings: &[&str]) -> (i32, String) {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let settings: Vec<String> = settings.iter().map(|&setting| setting.into()).collect();
     let finished = run(
-        &image("ecu"),
+        &image("bench"),
         Machine::Mps2An386,
         &settings,
         folder.path(),

@@ -19,3 +19,5 @@ pub fn count_sample() -> u32 {
 pub fn elapsed_ms() -> u32 {
     SAMPLES.load(Ordering::Relaxed) / SAMPLES_PER_MS.load(Ordering::Relaxed).max(1)
 }
+
+defmt::timestamp!("{=u32:ms}", elapsed_ms());

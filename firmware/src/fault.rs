@@ -1,18 +1,26 @@
-//! Faults: the PWM goes neutral first, then the run ends with an exit code of its own.
+//! Faults of the program itself. The image decides how it reaches its safe state.
 
-use crate::board::{Board, Current};
-use crate::exit::{ExitCode, exit};
-use crate::recorder;
 use core::arch::naked_asm;
 use cortex_m_rt::exception;
 
-/// The safe state, and the end of the run: PWM neutral, trailer written, exit code given.
-pub fn end_safely(code: ExitCode) -> ! {
-    cortex_m::interrupt::disable();
-    Current::neutralise_pwm();
-    // Nothing more can be done where the host does not take the trailer.
-    let _ = recorder::finish(code);
-    exit(code)
+/// Reason why the program cannot continue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Fault {
+    /// The program panicked.
+    Panic = 1,
+    /// A hard fault.
+    HardFault = 2,
+    /// The watchdog was not fed.
+    Watchdog = 3,
+    /// An interrupt without a handler.
+    UnexpectedInterrupt = 4,
+}
+
+// SAFETY: each image defines the function, with this signature and without requirements.
+unsafe extern "Rust" {
+    /// The image's safe state. May be called from any handler, and with most of the stack used.
+    pub safe fn enter_safe_state(fault: Fault) -> !;
 }
 
 /// Uses the whole stack from its top: after an overflow there is none left.
@@ -34,19 +42,13 @@ unsafe extern "C" fn hard_fault() -> ! {
 // here, after the assembly.
 #[unsafe(no_mangle)]
 extern "C" fn end_hard_fault() -> ! {
-    end_safely(ExitCode::HardFault)
+    enter_safe_state(Fault::HardFault)
 }
 
 /// The watchdog's interrupt.
-// SAFETY: touches only atomics, device registers and the host, so it may interrupt anything; and it
-// does not return.
+// SAFETY: an image's safe state touches only atomics, device registers and the host, so it may
+// interrupt anything; and it does not return.
 #[exception]
 unsafe fn NonMaskableInt() -> ! {
-    end_safely(ExitCode::Watchdog)
-}
-
-// SAFETY: as above.
-#[exception]
-unsafe fn DefaultHandler(_number: i16) -> ! {
-    end_safely(ExitCode::UnexpectedInterrupt)
+    enter_safe_state(Fault::Watchdog)
 }

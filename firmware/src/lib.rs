@@ -1,32 +1,22 @@
-//! Steering ECU: the program of `shared-model` on a Cortex-M, with interrupts, telemetry and a safe
+//! Steering ECU: the program of `shared-model` on a Cortex-M, with interrupts, a bus and a safe
 //! state around it. No arithmetic of the model is here.
 //!
 //! | subject | module |
 //! |---|---|
-//! | start, end and interrupts of a run | [`app`], [`interrupts`] |
-//! | the tasks without and with a vehicle | [`open_loop`], [`in_loop`] |
 //! | requirements on a board | [`board`] |
+//! | the program in two interrupts | [`steering`], [`tasks`] |
 //! | fault handlers | [`fault`] |
-//! | telemetry | [`recorder`] |
-//! | log | [`log`] |
+//! | the product: configuration in flash, frames on a bus | [`product`] |
+//! | the laboratory: scenario and telemetry through the emulator | [`bench`] |
 
 #![no_std]
 
-pub mod app;
+pub mod bench;
 pub mod board;
 pub mod clock;
-pub mod command_line;
-pub mod counters;
-pub mod exit;
 pub mod fault;
-pub mod host_file;
-pub mod in_loop;
-pub mod interrupts;
-pub mod jitter;
-pub mod link;
-pub mod log;
-pub mod open_loop;
-pub mod recorder;
+pub mod product;
 pub mod refusal;
 pub mod stack;
+pub mod steering;
 pub mod tasks;

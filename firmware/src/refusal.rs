@@ -1,24 +1,10 @@
-//! Refused scenarios: the reason in the log, and the exit code.
+//! The reason why a scenario is refused, in the log.
 
-use crate::board::{Board, Current};
-use crate::command_line::CommandError;
-use crate::exit::ExitCode;
 use shared_model::stability::{MAX_STEP_TIMES_RATE, min_rate_hz};
 use shared_model::{InvalidScenario, MAX_RATIO};
 
-/// For a command line that cannot be read, or a word of it that is no setting.
-pub fn refuse_command(error: &CommandError) -> ExitCode {
-    match error {
-        CommandError::Unreadable => defmt::error!("scenario refused: no readable command line"),
-        CommandError::Setting(word, error) => {
-            defmt::error!("scenario refused: {=str}: {=str}", word, error.reason());
-        }
-    }
-    ExitCode::BadScenario
-}
-
-/// For a scenario that cannot be run.
-pub fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
+/// Logs the reason.
+pub fn log_invalid_scenario(error: &InvalidScenario) {
     // In the words of its `Display`, whose formatting would take flash and panics; a test holds the
     // two together.
     match *error {
@@ -85,15 +71,4 @@ pub fn refuse_scenario(error: &InvalidScenario) -> ExitCode {
             min_rate_hz(fastest_rate_per_s)
         ),
     }
-    ExitCode::BadScenario
-}
-
-/// For a scenario with the timer clock of another board.
-pub fn refuse_timer_clock(timer_clock_hz: f32) -> ExitCode {
-    defmt::error!(
-        "scenario refused: servo.timer_clock_hz = {=f32}: must be {=u32}, this board's",
-        timer_clock_hz,
-        Current::TIMER_CLOCK_HZ
-    );
-    ExitCode::BadScenario
 }

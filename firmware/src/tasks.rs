@@ -1,12 +1,30 @@
-//! The state that the interrupts and the main program share: the control task is due, the run is
-//! finished.
+//! The control task is due: signalled by the PWM interrupt, at high priority, to the control
+//! interrupt, at low priority.
+//!
+//! SysTick is the PWM interrupt. Once per control period it pends the PendSV exception, which runs
+//! the control task. So the two rates are locked, and the PWM interrupt preempts a control task
+//! that is still at work.
 
-use crate::board::{Board, Current};
 use core::sync::atomic::{AtomicBool, Ordering};
 use cortex_m::peripheral::SCB;
+use cortex_m::peripheral::scb::SystemHandler;
+
+/// Priorities as the registers have them; a lower number preempts a higher one.
+const PWM_PRIORITY: u8 = 0x20;
+const CONTROL_PRIORITY: u8 = 0xE0;
 
 static CONTROL_DUE: AtomicBool = AtomicBool::new(false);
-static FINISHED: AtomicBool = AtomicBool::new(false);
+
+/// Gives the two interrupts their priorities. For use before either is enabled.
+pub fn set_priorities() {
+    // SAFETY: called once, before an interrupt is enabled or inside a critical section, so nothing
+    // runs at the old priorities meanwhile.
+    unsafe {
+        let mut core = cortex_m::Peripherals::steal();
+        SCB::set_priority(&mut core.SCB, SystemHandler::SysTick, PWM_PRIORITY);
+        SCB::set_priority(&mut core.SCB, SystemHandler::PendSV, CONTROL_PRIORITY);
+    }
+}
 
 /// Makes the control task due; false if it has not been done since it was last due.
 pub fn call_control() -> bool {
@@ -18,15 +36,4 @@ pub fn call_control() -> bool {
 /// The control task that was due is done.
 pub fn control_done() {
     CONTROL_DUE.store(false, Ordering::Relaxed);
-}
-
-/// Ends the run: no further PWM interrupt comes.
-pub fn finish() {
-    Current::stop_pwm_interrupt();
-    FINISHED.store(true, Ordering::Release);
-}
-
-/// Whether the run is over.
-pub fn is_finished() -> bool {
-    FINISHED.load(Ordering::Acquire)
 }

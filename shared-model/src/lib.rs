@@ -5,7 +5,10 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod bus;
+pub mod configuration;
 pub mod controller;
+pub mod diagnostic;
 pub mod dither;
 pub mod e2e;
 pub mod ecu;
@@ -23,6 +26,7 @@ pub mod real;
 pub mod scenario;
 pub mod schedule;
 pub mod schedule_table;
+pub mod segments;
 pub mod serial;
 pub mod servo;
 pub mod settings;

@@ -2,11 +2,13 @@
 
 use image::stack::Priority;
 
-/// Priorities of the firmware's code in rising order, as `firmware/src/interrupts.rs` sets them.
-pub const PRIORITIES: [Priority; 5] = [
+/// Priorities of the firmware's code in rising order, as `firmware/src/tasks.rs` and
+/// `firmware/src/product/uart.rs` set them.
+pub const PRIORITIES: [Priority; 6] = [
     priority("main program", &["Reset"]),
     priority("control task", &["PendSV"]),
-    priority("PWM interrupt", &["SysTick", "DefaultHandler"]),
+    priority("PWM interrupt", &["SysTick"]),
+    priority("UART", &["DefaultHandler"]),
     // HardFault itself moves the stack pointer back to the top; this is counted all the same as if
     // it lay below the others.
     priority("hard fault", &["end_hard_fault"]),

@@ -38,14 +38,6 @@ pub fn board_image(board: &str, name: &str) -> Image {
     }
 }
 
-/// The ECU's image for a board, compiled with the functions' frames.
-///
-/// # Panics
-/// If it is not built: a test that cannot run has not passed.
-pub fn framed_image(board: &str) -> Image {
-    open(&target().join("stack-sizes").join(board), "ecu")
-}
-
 /// The workspace's folder.
 pub fn root() -> &'static Path {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
@@ -88,7 +80,6 @@ pub fn run(
     folder: &Path,
     limit: Duration,
 ) -> Result<Finished, RunError> {
-    // The fault drill logs nothing.
     let log = LogDecoder::new(image).map_err(RunError::Log)?;
     qemu::run_with(&log, image, machine, settings, folder, limit, |_| {})
 }
@@ -101,7 +92,7 @@ pub fn record(scenario: &Scenario<f32>, machine: Machine, exit_code: i32) -> Rec
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let mut settings = settings::of(scenario);
     settings.push(format!("telemetry={TELEMETRY}"));
-    let image = board_image(machine.board(), "ecu");
+    let image = board_image(machine.board(), "bench");
     let finished = run(&image, machine, &settings, folder.path(), TIME_OUT)
         .unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(finished.exit_code, exit_code, "log: {:?}", finished.log);

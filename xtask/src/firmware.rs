@@ -12,6 +12,9 @@ use crate::{process, rustup, workspace};
 /// The default board. Its images are where a plain `cargo build` puts them.
 pub const USUAL_BOARD: &str = "mps2";
 
+/// Cargo's variable for flags of the target's code alone.
+const RUSTFLAGS_OF_TARGET: &str = "CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS";
+
 /// All boards: the folders in the firmware's `src/board`.
 pub fn boards() -> Result<Vec<String>> {
     let folder = workspace::firmware().join("src").join("board");
@@ -34,11 +37,7 @@ pub fn build(toolchain: &str, board: &str, selection: &[&str]) -> Result<()> {
 /// A command of cargo on the firmware for a board, in the firmware's folder, where its own
 /// configuration holds.
 pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
-    cargo_into(toolchain, command, board, &target_dir(board)?)
-}
-
-fn cargo_into(toolchain: &str, command: &str, board: &str, target_dir: &Path) -> Result<Command> {
-    let mut cargo = cargo_for_target(toolchain, command, target_dir)?;
+    let mut cargo = cargo_for_target(toolchain, command, &target_dir(board)?)?;
     cargo
         .arg("--no-default-features")
         .arg(format!("--features=board-{board}"));
@@ -70,38 +69,17 @@ fn cargo_for_target(toolchain: &str, command: &str, target_dir: &Path) -> Result
     ] {
         cargo.env_remove(variable);
     }
-    Ok(cargo)
-}
-
-/// A build of the ECU's program with a section `.stack_sizes`, the frame of each function, in a
-/// folder of its own.
-///
-/// The option is not stable yet. For one crate alone it may still be used, and as that crate's
-/// compilation makes the code of all others, too, the frames are those of the whole program. The
-/// code is that of [`build`].
-pub fn framed(toolchain: &str, board: &str) -> Result<Command> {
-    let mut cargo = cargo_into(toolchain, "rustc", board, &framed_target_dir(board)?)?;
+    // A section with the frame of each function, for the bound of the stack. The option is not
+    // stable yet; the code is the same with and without it.
     cargo
-        .env("RUSTC_BOOTSTRAP", "ecu")
-        .args(["--bin", "ecu", "--", "-Zemit-stack-sizes"]);
+        .env("RUSTC_BOOTSTRAP", "1")
+        .env(RUSTFLAGS_OF_TARGET, "-Zemit-stack-sizes");
     Ok(cargo)
 }
 
-/// The image that [`framed`] builds.
-pub fn framed_elf(board: &str) -> Result<PathBuf> {
-    Ok(framed_target_dir(board)?
-        .join(TARGET)
-        .join("firmware")
-        .join("ecu"))
-}
-
-fn framed_target_dir(board: &str) -> Result<PathBuf> {
-    Ok(workspace::target_dir()?.join("stack-sizes").join(board))
-}
-
-/// The ECU's program for a board.
-pub fn elf(board: &str) -> Result<PathBuf> {
-    Ok(target_dir(board)?.join(TARGET).join("firmware").join("ecu"))
+/// An image for a board.
+pub fn elf(board: &str, image: &str) -> Result<PathBuf> {
+    Ok(target_dir(board)?.join(TARGET).join("firmware").join(image))
 }
 
 /// One for each board, or their programs, which have the same names, would replace each other.

@@ -56,7 +56,7 @@ enum Command {
     /// starts. Python packages for the tests go into target/python; the system's Python is not
     /// changed.
     #[command(
-        after_help = "Example:\n  cargo xtask setup && cd firmware && cargo run --profile firmware --bin ecu"
+        after_help = "Example:\n  cargo xtask setup && cd firmware && cargo run --profile firmware --bin bench"
     )]
     Setup,
 

@@ -1,19 +1,49 @@
-//! The steering ECU.
+//! The product's image: boots alone, configuration in flash, frames on a bus, log over RTT.
 
 #![no_std]
 #![no_main]
 
 use core::panic::PanicInfo;
-use firmware::exit::ExitCode;
-use firmware::{app, fault};
+use cortex_m_rt::{entry, exception};
+// The log's transport.
+use defmt_rtt as _;
+use firmware::fault::{Fault, enter_safe_state};
+use firmware::product::interrupts::{self, ControlInterrupt, PwmInterrupt};
+use firmware::product::{app, safe_state, uart};
 
-#[cortex_m_rt::entry]
+#[entry]
 fn main() -> ! {
-    let code = app::run();
-    fault::end_safely(code)
+    app::run()
+}
+
+#[exception]
+fn SysTick() {
+    static mut INTERRUPT: Option<&'static mut PwmInterrupt> = None;
+    interrupts::pwm(INTERRUPT);
+}
+
+#[exception]
+fn PendSV() {
+    static mut INTERRUPT: Option<&'static mut ControlInterrupt> = None;
+    interrupts::control(INTERRUPT);
+}
+
+/// The UART's interrupt; any other has no business here.
+// SAFETY: the UART's own state is taken in a critical section; the rest does not return.
+#[exception]
+unsafe fn DefaultHandler(number: i16) {
+    if !uart::interrupt(number) {
+        enter_safe_state(Fault::UnexpectedInterrupt);
+    }
+}
+
+// SAFETY: the one function of that name, with the signature that `fault` declares.
+#[unsafe(export_name = "enter_safe_state")]
+fn end_safely(fault: Fault) -> ! {
+    safe_state::enter(fault)
 }
 
 #[panic_handler]
 fn panic(_info: &PanicInfo<'_>) -> ! {
-    fault::end_safely(ExitCode::Panic)
+    enter_safe_state(Fault::Panic)
 }

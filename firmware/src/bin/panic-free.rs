@@ -1,5 +1,5 @@
-//! Proof that the control path cannot panic: this image links only if no panic is reachable from
-//! its interrupts.
+//! Proof that the control paths of both images cannot panic: this image links only if no panic is
+//! reachable from their interrupts.
 //!
 //! The panic handler calls a function that is not defined. Where the optimiser finds every panic
 //! unreachable, the handler and its call vanish; otherwise the linker reports the function, whose
@@ -11,7 +11,9 @@
 
 use core::panic::PanicInfo;
 use core::ptr::read_volatile;
-use firmware::interrupts::{self, ControlInterrupt, PwmInterrupt};
+use cortex_m_rt::exception;
+use firmware::fault::{Fault, enter_safe_state};
+use firmware::{bench, product};
 
 // SAFETY: there is no such function; where it is called, the link fails.
 unsafe extern "C" {
@@ -21,22 +23,68 @@ unsafe extern "C" {
 /// An address in RAM, so that the tasks are unknown to the optimiser.
 const ANYWHERE: usize = 0x2000_8000;
 
+type BenchTasks = (
+    bench::interrupts::PwmInterrupt,
+    bench::interrupts::ControlInterrupt,
+);
+type ProductTasks = (
+    &'static mut product::interrupts::PwmInterrupt,
+    &'static mut product::interrupts::ControlInterrupt,
+);
+
 // SAFETY: the start-up code calls the function of this name, and there is no other.
 #[unsafe(no_mangle)]
 extern "C" fn main() -> ! {
     // SAFETY: none; this image is linked, not run.
-    let (pwm, control) = unsafe {
+    let (bench, product) = unsafe {
         (
-            read_volatile(ANYWHERE as *const PwmInterrupt),
-            read_volatile(ANYWHERE as *const ControlInterrupt),
+            read_volatile(ANYWHERE as *const BenchTasks),
+            read_volatile(ANYWHERE as *const ProductTasks),
         )
     };
     #[cfg(feature = "reachable-panic")]
-    assert!(!matches!(control, ControlInterrupt::InLoop(_)), "provoked");
-    interrupts::hand_over(pwm, control, 10);
+    assert!(
+        !matches!(bench.1, bench::interrupts::ControlInterrupt::InLoop(_)),
+        "provoked"
+    );
+    bench::interrupts::hand_over(bench.0, bench.1, 10);
+    product::interrupts::hand_over(product.0, product.1, 10);
     loop {
         cortex_m::asm::wfi();
     }
+}
+
+#[exception]
+fn SysTick() {
+    static mut BENCH: Option<bench::interrupts::PwmInterrupt> = None;
+    static mut PRODUCT: Option<&'static mut product::interrupts::PwmInterrupt> = None;
+    bench::interrupts::pwm(BENCH);
+    product::interrupts::pwm(PRODUCT);
+}
+
+#[exception]
+fn PendSV() {
+    static mut BENCH: Option<bench::interrupts::ControlInterrupt> = None;
+    static mut PRODUCT: Option<&'static mut product::interrupts::ControlInterrupt> = None;
+    bench::interrupts::control(BENCH);
+    product::interrupts::control(PRODUCT);
+}
+
+// SAFETY: none; this image is linked, not run.
+#[exception]
+unsafe fn DefaultHandler(number: i16) {
+    if !product::uart::interrupt(number) {
+        enter_safe_state(Fault::UnexpectedInterrupt);
+    }
+}
+
+// SAFETY: the one function of that name, with the signature that `fault` declares.
+#[unsafe(export_name = "enter_safe_state")]
+fn end_safely(fault: Fault) -> ! {
+    if fault == Fault::Panic {
+        product::safe_state::enter(fault);
+    }
+    bench::exit::end_safely(fault.into())
 }
 
 #[panic_handler]

@@ -6,6 +6,8 @@
 
 mod systick;
 
+use shared_model::diagnostic::ResetCause;
+
 #[cfg(feature = "board-mps2")]
 mod mps2;
 #[cfg(feature = "board-mps2")]
@@ -25,7 +27,11 @@ pub use nucleog474re::NucleoG474re as Current;
 pub trait Board {
     /// The servo's PWM.
     type Pwm: embedded_hal::pwm::SetDutyCycle;
+    /// The enable pin of the servo's bridge, high for on: the second way to switch it off.
+    type Bridge: embedded_hal::digital::OutputPin;
 
+    /// Name of the board's folder, for which a configuration is made.
+    const NAME: &str;
     /// Clock of the PWM's timer, Hz. A scenario whose `servo.timer_clock_hz` is another is refused:
     /// its carrier and all its times would be off by the ratio.
     const TIMER_CLOCK_HZ: u32;
@@ -33,13 +39,22 @@ pub trait Board {
     const COST_CLOCK_HZ: u32;
     /// Instructions per second of a simulated core; 0 on silicon.
     const INSTRUCTION_RATE_HZ: u32;
+    /// Interrupts of the UART. The first is the one that the program may pend.
+    const UART_INTERRUPTS: &[u16];
+
+    /// Cause of the last reset. Clears it, so for use once.
+    fn reset_cause() -> ResetCause;
 
     /// Starts the PWM with a period of `period` counts at the neutral duty, and calls the SysTick
-    /// exception once per period.
+    /// exception once per period. The bridge stays off.
     ///
     /// # Errors
     /// If the period does not fit the timer, or the PWM is started already.
-    fn start_pwm(period: u16) -> Result<Self::Pwm, BoardError>;
+    fn start_pwm(period: u16) -> Result<(Self::Pwm, Self::Bridge), BoardError>;
+
+    /// Switches the bridge off. Works at any time and from any handler, also before the PWM is
+    /// started.
+    fn disable_bridge();
 
     /// Stops the PWM interrupt; the PWM keeps its duty.
     fn stop_pwm_interrupt() {
@@ -65,14 +80,20 @@ pub trait Board {
     /// Feeds the watchdog.
     fn feed_watchdog();
 
-    /// Opens the UART that links a host.
+    /// Opens the UART of the bus, 8 bits without parity, with its interrupt on received bytes.
     fn open_uart();
 
-    /// Sends a byte on it, waiting for room.
-    fn uart_send(byte: u8);
+    /// Acknowledges the UART's interrupt, where that is not done by reading and writing its data.
+    fn uart_acknowledge() {}
 
-    /// The next byte from it, if there is one.
+    /// The next received byte, if there is one. Clears errors of the line, whose byte is lost.
     fn uart_receive() -> Option<u8>;
+
+    /// Sends a byte if there is room for it now.
+    fn uart_send(byte: u8) -> bool;
+
+    /// Interrupts also when there is room to send.
+    fn uart_interrupt_on_room(on: bool);
 
     /// Waits until there may be work to do.
     fn idle() {

@@ -38,7 +38,7 @@ const MAX_LISTED: usize = 20;
 #[derive(Args)]
 #[command(after_help = "Examples:
   sim-host faults --quick
-  sim-host faults --firmware target/thumbv7em-none-eabihf/firmware/ecu \\
+  sim-host faults --firmware target/thumbv7em-none-eabihf/firmware/bench \\
       --out faults.csv --json faults.json --figure faults.svg")]
 pub struct Arguments {
     /// Inject at one time per manoeuvre, and flip few bits

@@ -41,7 +41,7 @@ use std::path::{Path, PathBuf};
       --record ramp.loop --out ramp.csv
   sim-host pil --replay ramp.loop       # the recorded run, without QEMU
   sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
-  sim-host pil --link uart --time 1     # the board's UART: realistic, slow")]
+  sim-host pil --link uart --time 5     # the image `ecu`, over its UART")]
 pub struct Arguments {
     /// Manoeuvres, as TOML files [default: constant speed of 1750 rpm, square dither from 3 s, 20
     /// s]
@@ -62,13 +62,10 @@ pub struct Arguments {
     /// Machine to emulate
     #[arg(long, value_parser = machines(), default_value = "mps2-an386")]
     machine: Machine,
-    /// Firmware image (ELF)
-    #[arg(
-        long,
-        value_name = "ELF",
-        default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
-    )]
-    firmware: PathBuf,
+    /// Firmware image (ELF) [default: target/thumbv7em-none-eabihf/firmware/bench, or `ecu` there
+    /// for the link uart]
+    #[arg(long, value_name = "ELF")]
+    firmware: Option<PathBuf>,
     /// Record the exchange between firmware and vehicle
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
@@ -92,7 +89,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let manoeuvres = arguments.manoeuvres()?;
     arguments.check_outputs(manoeuvres.len())?;
     let target = Target {
-        image: open_image(&arguments.firmware)?,
+        image: open_image(&arguments.firmware())?,
         machine: arguments.machine,
         link: arguments.link,
         time_out,
@@ -128,6 +125,15 @@ fn keep_to_one_core() {
 }
 
 impl Arguments {
+    fn firmware(&self) -> PathBuf {
+        let name = match self.link {
+            LinkKind::Uart => "ecu",
+            LinkKind::Files | LinkKind::Timed => "bench",
+        };
+        let usual = Path::new("target/thumbv7em-none-eabihf/firmware").join(name);
+        self.firmware.clone().unwrap_or(usual)
+    }
+
     fn manoeuvres(&self) -> anyhow::Result<Vec<(Scenario<f64>, Manoeuvre)>> {
         let mut manoeuvres = Vec::new();
         for file in &self.scenario {
@@ -169,7 +175,8 @@ impl Arguments {
             );
         }
         let scenarios = self.scenario.iter();
-        let firmware = ("--firmware", self.firmware.as_path());
+        let firmware = self.firmware();
+        let firmware = ("--firmware", firmware.as_path());
         let inputs = scenarios.map(|file| ("--scenario", file.as_path()));
         let files = of_one.into_iter().chain([json]);
         check(inputs.chain([firmware]), files, self.files.force).map(drop)
@@ -298,7 +305,8 @@ fn show(summaries: &[Summary], link: LinkKind) {
             LinkKind::Files =>
                 "over pipes; the host is the clock, and each control tick takes its nominal time",
             LinkKind::Timed => "over pipes; the board's timers are the clock",
-            LinkKind::Uart => "over the board's UART, framed; the host is the clock",
+            LinkKind::Uart =>
+                "the image `ecu` over its UART; the board's timers are the clock, the debugger stops them while the vehicle answers",
         }
     );
 }

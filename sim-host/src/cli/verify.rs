@@ -8,7 +8,6 @@ use anyhow::ensure;
 use dynamics::config::validate;
 use dynamics::words::Short;
 use files::output::make_folder;
-use image::Image;
 use indicatif::{ProgressBar, ProgressStyle};
 use plot::terminal;
 use sim_host::report::{self, ReportInput};
@@ -37,17 +36,9 @@ pub struct Arguments {
     #[arg(
         long,
         value_name = "ELF",
-        default_value = "target/thumbv7em-none-eabihf/firmware/ecu"
+        default_value = "target/thumbv7em-none-eabihf/firmware/bench"
     )]
     firmware: PathBuf,
-    /// The same image compiled with stack sizes, for the worst stack; `cargo xtask proofs` builds
-    /// it
-    #[arg(
-        long,
-        value_name = "ELF",
-        default_value = "target/stack-sizes/mps2/thumbv7em-none-eabihf/firmware/ecu"
-    )]
-    stack_sizes: PathBuf,
     /// Folder with the recorded proofs, for the report
     #[arg(long, value_name = "FOLDER", default_value = "tests/golden")]
     proofs: PathBuf,
@@ -82,7 +73,6 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let options = Options {
         time_out: time_out(arguments.time_out)?,
         image: open_image(&arguments.firmware)?,
-        framed_image: Image::open(&arguments.stack_sizes).map_err(|error| error.to_string()),
         base,
         duration_s,
     };
@@ -104,10 +94,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 impl Arguments {
     /// A report exists if one of its files exists.
     fn check_outputs(&self) -> anyhow::Result<()> {
-        let inputs = [
-            ("--firmware", self.firmware.as_path()),
-            ("--stack-sizes", &self.stack_sizes),
-        ];
+        let inputs = [("--firmware", self.firmware.as_path())];
         let mut outputs = check(
             inputs.into_iter().chain(self.config.input()),
             [],

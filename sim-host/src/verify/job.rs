@@ -12,8 +12,6 @@ use std::time::Duration;
 pub struct Options {
     /// The firmware.
     pub image: Image,
-    /// The same compiled with the functions' frames, for the worst stack; or why there is none.
-    pub framed_image: Result<Image, String>,
     /// Vehicle, road, friction, servo and rates of all runs; their speeds and dithers are the
     /// job's own.
     pub base: Scenario<f64>,

@@ -14,9 +14,6 @@ pub fn run(args: &[String]) -> Result<()> {
     stage("firmware", || {
         firmware::build(&toolchain, firmware::USUAL_BOARD, &["--bins"])
     })?;
-    stage("firmware with its functions' frames", || {
-        process::run(&mut firmware::framed(&toolchain, firmware::USUAL_BOARD)?)
-    })?;
     stage("host program", build_sim_host)?;
     stage("verify", || verify(args))
 }
@@ -26,9 +23,7 @@ fn verify(args: &[String]) -> Result<()> {
     sim_host
         .current_dir(workspace::root())
         .args(["verify", "--force", "--firmware"])
-        .arg(firmware::elf(firmware::USUAL_BOARD)?)
-        .arg("--stack-sizes")
-        .arg(firmware::framed_elf(firmware::USUAL_BOARD)?)
+        .arg(firmware::elf(firmware::USUAL_BOARD, "bench")?)
         .args(args);
     let status = process::status(&mut sim_host)?;
     match status.code() {

@@ -9,7 +9,7 @@ use crate::{firmware, rustup, setup};
 const ALL: &str = "all";
 
 /// Builds the firmware's programs for `board`, or for all boards, and prints the path of each
-/// ECU's.
+/// bench image.
 pub fn run(board: &str) -> Result<()> {
     let known = firmware::boards()?;
     let chosen: Vec<&str> = match known.iter().find(|known| *known == board) {
@@ -31,7 +31,7 @@ pub fn run(board: &str) -> Result<()> {
         })?;
     }
     for board in chosen {
-        println!("{}", firmware::elf(board)?.display());
+        println!("{}", firmware::elf(board, "bench")?.display());
     }
     Ok(())
 }

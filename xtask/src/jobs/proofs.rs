@@ -43,18 +43,14 @@ pub fn run(overwrite_expected: bool) -> Result<()> {
     Ok(())
 }
 
-/// Every board's programs, the panic-free proof with them, and the ECU's once more with its
-/// functions' frames.
+/// Every board's images, and the panic-free proof with them.
 pub fn build(toolchain: &str) -> Result<()> {
     for board in firmware::boards()? {
         stage(&format!("firmware for {board}"), || {
-            firmware::build(toolchain, &board, &["--bin", "ecu", "--bin", "fault-drill"])
+            firmware::build(toolchain, &board, &["--bin", "ecu", "--bin", "bench"])
         })?;
         stage(&format!("panic-free proof for {board}"), || {
             prove_panic_free(toolchain, &board)
-        })?;
-        stage(&format!("frames of the firmware for {board}"), || {
-            process::run(&mut firmware::framed(toolchain, &board)?)
         })?;
     }
     Ok(())

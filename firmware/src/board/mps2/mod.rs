@@ -1,13 +1,15 @@
 //! Arm MPS2 with the AN386 (Cortex-M4F) or AN500 (Cortex-M7) image, as QEMU emulates them.
 //!
-//! The board has no PWM. A virtual one takes its place: it holds the duty code in a register of
-//! RAM.
+//! The board has no PWM and no bridge. Virtual ones take their place: they hold duty code and
+//! enable pin in registers of RAM, and the duty codes of the last periods for a debugger.
 
 use super::{Board, BoardError, systick};
 use core::convert::Infallible;
 use core::ptr::{read_volatile, write_volatile};
-use core::sync::atomic::{AtomicU16, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering};
+use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
+use shared_model::diagnostic::ResetCause;
 
 /// Clock of the core, SysTick and the APB timers, Hz.
 const CLOCK_HZ: u32 = 25_000_000;
@@ -30,19 +32,47 @@ const WATCHDOG_UNLOCK_KEY: u32 = 0x1ACC_E551;
 /// Raises the non-maskable interrupt at the first expiry, without a reset at the second.
 const WATCHDOG_INTERRUPT: u32 = 1;
 
-/// CMSDK UART 1: data, state, control and baud-rate registers. UART 0 is the console.
+/// CMSDK UART 1: data, state, control, interrupt and baud-rate registers. UART 0 is the console.
 const UART1_DATA: *mut u32 = 0x4000_5000 as *mut u32;
 const UART1_STATE: *mut u32 = 0x4000_5004 as *mut u32;
 const UART1_CTRL: *mut u32 = 0x4000_5008 as *mut u32;
+const UART1_INTCLEAR: *mut u32 = 0x4000_500C as *mut u32;
 const UART1_BAUDDIV: *mut u32 = 0x4000_5010 as *mut u32;
 const UART_TX_FULL: u32 = 1;
 const UART_RX_FULL: u32 = 2;
-const UART_TX_AND_RX: u32 = 3;
-/// The least that the UART takes: 1.56 Mbit/s at 25 MHz.
-const UART_LEAST_DIVIDER: u32 = 16;
+/// Sender, receiver, and an interrupt of each.
+const UART_ON: u32 = 0b1111;
+const UART_INTERRUPT_BITS: u32 = 0b1111;
+/// 1 Mbit/s.
+const UART_DIVIDER: u32 = CLOCK_HZ / 1_000_000;
+/// Received byte, room to send.
+const UART_INTERRUPTS: [u16; 2] = [2, 3];
 
-static DUTY: AtomicU16 = AtomicU16::new(0);
-static PERIOD: AtomicU16 = AtomicU16::new(0);
+/// Duty codes that the virtual PWM remembers.
+const TRACE_LEN: u32 = 128;
+
+/// The registers of virtual PWM and bridge, and the duties of the last periods for a debugger.
+#[repr(C)]
+struct Registers {
+    /// Periods since the start.
+    periods: AtomicU32,
+    duty: AtomicU16,
+    period: AtomicU16,
+    /// The enable pin of the bridge.
+    bridge: AtomicBool,
+    /// The duty of period n at n modulo the length.
+    trace: [AtomicU16; TRACE_LEN as usize],
+}
+
+// SAFETY: nothing else has this name.
+#[unsafe(export_name = "VIRTUAL_PWM")]
+static REGISTERS: Registers = Registers {
+    periods: AtomicU32::new(0),
+    duty: AtomicU16::new(0),
+    period: AtomicU16::new(0),
+    bridge: AtomicBool::new(false),
+    trace: [const { AtomicU16::new(0) }; TRACE_LEN as usize],
+};
 
 /// The board.
 pub struct Mps2;
@@ -62,21 +92,56 @@ impl SetDutyCycle for VirtualPwm {
     }
 
     fn set_duty_cycle(&mut self, duty: u16) -> Result<(), Infallible> {
-        DUTY.store(duty.min(self.period), Ordering::Relaxed);
+        let duty = duty.min(self.period);
+        REGISTERS.duty.store(duty, Ordering::Relaxed);
+        let period = REGISTERS.periods.load(Ordering::Relaxed);
+        REGISTERS
+            .periods
+            .store(period.wrapping_add(1), Ordering::Relaxed);
+        if let Some(place) = REGISTERS.trace.get((period % TRACE_LEN) as usize) {
+            place.store(duty, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+}
+
+/// The virtual enable pin.
+pub struct VirtualBridge;
+
+impl digital::ErrorType for VirtualBridge {
+    type Error = Infallible;
+}
+
+impl OutputPin for VirtualBridge {
+    fn set_low(&mut self) -> Result<(), Infallible> {
+        REGISTERS.bridge.store(false, Ordering::Relaxed);
+        Ok(())
+    }
+
+    fn set_high(&mut self) -> Result<(), Infallible> {
+        REGISTERS.bridge.store(true, Ordering::Relaxed);
         Ok(())
     }
 }
 
 impl Board for Mps2 {
     type Pwm = VirtualPwm;
+    type Bridge = VirtualBridge;
 
+    const NAME: &str = "mps2";
     const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
     const COST_CLOCK_HZ: u32 = CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = INSTRUCTION_RATE_HZ;
+    const UART_INTERRUPTS: &[u16] = &UART_INTERRUPTS;
 
-    fn start_pwm(period: u16) -> Result<VirtualPwm, BoardError> {
+    /// The emulator does not report it.
+    fn reset_cause() -> ResetCause {
+        ResetCause::Unknown
+    }
+
+    fn start_pwm(period: u16) -> Result<(VirtualPwm, VirtualBridge), BoardError> {
         let mut core = cortex_m::Peripherals::take().ok_or(BoardError)?;
-        PERIOD.store(period, Ordering::Relaxed);
+        REGISTERS.period.store(period, Ordering::Relaxed);
         Self::neutralise_pwm();
 
         // SAFETY: writes to registers of the timer, which nothing else uses.
@@ -86,17 +151,22 @@ impl Board for Mps2 {
             write_volatile(TIMER0_CTRL, 1);
         }
         systick::start(&mut core.SYST, period);
-        Ok(VirtualPwm { period })
+        Ok((VirtualPwm { period }, VirtualBridge))
+    }
+
+    fn disable_bridge() {
+        REGISTERS.bridge.store(false, Ordering::Relaxed);
     }
 
     fn neutralise_pwm() {
-        DUTY.store(PERIOD.load(Ordering::Relaxed) / 2, Ordering::Relaxed);
+        let neutral = REGISTERS.period.load(Ordering::Relaxed) / 2;
+        REGISTERS.duty.store(neutral, Ordering::Relaxed);
     }
 
     fn pwm_output() -> (u16, u16) {
         (
-            DUTY.load(Ordering::Relaxed),
-            PERIOD.load(Ordering::Relaxed) / 2,
+            REGISTERS.duty.load(Ordering::Relaxed),
+            REGISTERS.period.load(Ordering::Relaxed) / 2,
         )
     }
 
@@ -131,17 +201,14 @@ impl Board for Mps2 {
     fn open_uart() {
         // SAFETY: writes to registers of the UART, which nothing else uses.
         unsafe {
-            write_volatile(UART1_BAUDDIV, UART_LEAST_DIVIDER);
-            write_volatile(UART1_CTRL, UART_TX_AND_RX);
+            write_volatile(UART1_BAUDDIV, UART_DIVIDER);
+            write_volatile(UART1_CTRL, UART_ON);
         }
     }
 
-    fn uart_send(byte: u8) {
-        // SAFETY: a read of the UART's state and a write of its data register.
-        unsafe {
-            while read_volatile(UART1_STATE) & UART_TX_FULL != 0 {}
-            write_volatile(UART1_DATA, byte.into());
-        }
+    fn uart_acknowledge() {
+        // SAFETY: a write to the UART's interrupt register.
+        unsafe { write_volatile(UART1_INTCLEAR, UART_INTERRUPT_BITS) };
     }
 
     fn uart_receive() -> Option<u8> {
@@ -151,4 +218,18 @@ impl Board for Mps2 {
             is_full.then(|| read_volatile(UART1_DATA) as u8)
         }
     }
+
+    fn uart_send(byte: u8) -> bool {
+        // SAFETY: a read of the UART's state and a write of its data register.
+        unsafe {
+            let has_room = read_volatile(UART1_STATE) & UART_TX_FULL == 0;
+            if has_room {
+                write_volatile(UART1_DATA, byte.into());
+            }
+            has_room
+        }
+    }
+
+    /// It interrupts after each byte sent, whatever follows.
+    fn uart_interrupt_on_room(_on: bool) {}
 }

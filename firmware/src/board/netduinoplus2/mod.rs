@@ -1,7 +1,7 @@
 //! Netduino Plus 2: STM32F405 (Cortex-M4F), on silicon and as QEMU emulates it.
 //!
-//! TIM3's first channel, on pin PA6, is the servo's PWM. TIM2 counts the cost of the tasks. USART1,
-//! on PB6 and PB7, links a host. All clocks are the 16 MHz of the internal oscillator, which the
+//! TIM3's first channel, on pin PA6, is the servo's PWM, PA7 enables its bridge. TIM2 counts the cost
+//! of the tasks. USART1, on PB6 and PB7, is the bus. All clocks are the 16 MHz of the internal oscillator, which the
 //! chip has after a reset: the emulator has no clock controller, so a program that waits for the
 //! crystal or the PLL waits for ever.
 //!
@@ -14,6 +14,8 @@
 
 use super::{Board, BoardError, systick};
 use fugit::TimerDurationU32;
+use shared_model::diagnostic::ResetCause;
+use stm32f4xx_hal::gpio::{Output, PA7, PushPull};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Enable;
@@ -49,13 +51,35 @@ pub struct NetduinoPlus2;
 
 impl Board for NetduinoPlus2 {
     type Pwm = PwmChannel<pac::TIM3, C1>;
+    type Bridge = PA7<Output<PushPull>>;
 
+    const NAME: &str = "netduinoplus2";
     const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
     // The reports count instructions in the emulator. On silicon: CLOCK_HZ and 0.
     const COST_CLOCK_HZ: u32 = emulated::COST_CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = emulated::PROGRAM_INSTRUCTION_RATE_HZ;
+    const UART_INTERRUPTS: &[u16] = &[pac::Interrupt::USART1 as u16];
 
-    fn start_pwm(period: u16) -> Result<Self::Pwm, BoardError> {
+    fn reset_cause() -> ResetCause {
+        // SAFETY: a read and a write of the flags' register; nothing else uses them.
+        let rcc = unsafe { &*pac::RCC::ptr() };
+        let flags = rcc.csr().read();
+        let cause = if flags.porrstf().bit() || flags.borrstf().bit() {
+            ResetCause::Power
+        } else if flags.wdgrstf().bit() || flags.wwdgrstf().bit() {
+            ResetCause::Watchdog
+        } else if flags.sftrstf().bit() {
+            ResetCause::Program
+        } else if flags.padrstf().bit() {
+            ResetCause::Pin
+        } else {
+            ResetCause::Unknown
+        };
+        rcc.csr().modify(|_, w| w.rmvf().set_bit());
+        cause
+    }
+
+    fn start_pwm(period: u16) -> Result<(Self::Pwm, Self::Bridge), BoardError> {
         let chip = pac::Peripherals::take().ok_or(BoardError)?;
         let mut core = cortex_m::Peripherals::take().ok_or(BoardError)?;
         let mut rcc = chip.RCC.constrain();
@@ -73,7 +97,14 @@ impl Board for NetduinoPlus2 {
         // Right after the restart of the period, so that the interrupt writes a duty early in a
         // period and it is taken over at that period's end, never ambiguous between two.
         systick::start(&mut core.SYST, period);
-        Ok(pwm)
+        Ok((pwm, pins.pa7.into_push_pull_output()))
+    }
+
+    fn disable_bridge() {
+        // SAFETY: a write to a register that changes one pin alone. Without the port's clock, as
+        // before the start, it does nothing, and the pin is an input: the bridge's pull-down has it.
+        let port = unsafe { &*pac::GPIOA::ptr() };
+        port.bsrr().write(|w| w.br7().set_bit());
     }
 
     fn neutralise_pwm() {
@@ -123,21 +154,38 @@ impl Board for NetduinoPlus2 {
             .modify(|_, w| w.moder6().alternate().moder7().alternate());
         // SAFETY: a divider that the UART takes.
         uart.brr().write(|w| unsafe { w.bits(UART_DIVIDER) });
-        uart.cr1()
-            .write(|w| w.ue().enabled().te().enabled().re().enabled());
-    }
-
-    fn uart_send(byte: u8) {
-        // SAFETY: nothing else uses the UART.
-        let uart = unsafe { &*pac::USART1::ptr() };
-        while uart.sr().read().txe().bit_is_clear() {}
-        uart.dr().write(|w| w.dr().set(byte.into()));
+        uart.cr1().write(|w| {
+            let w = w.ue().enabled().te().enabled();
+            w.re().enabled().rxneie().enabled()
+        });
     }
 
     fn uart_receive() -> Option<u8> {
-        // SAFETY: nothing else uses the UART; reading the data takes the byte out.
+        // SAFETY: nothing else uses the UART; reading the data takes the byte out, and clears the
+        // errors of the line.
         let uart = unsafe { &*pac::USART1::ptr() };
-        let is_full = uart.sr().read().rxne().bit_is_set();
-        is_full.then(|| uart.dr().read().dr().bits() as u8)
+        let state = uart.sr().read();
+        let has_error = state.ore().bit() || state.fe().bit() || state.nf().bit();
+        if !(state.rxne().bit() || has_error) {
+            return None;
+        }
+        let byte = uart.dr().read().dr().bits() as u8;
+        (!has_error).then_some(byte)
+    }
+
+    fn uart_send(byte: u8) -> bool {
+        // SAFETY: nothing else uses the UART.
+        let uart = unsafe { &*pac::USART1::ptr() };
+        let has_room = uart.sr().read().txe().bit_is_set();
+        if has_room {
+            uart.dr().write(|w| w.dr().set(byte.into()));
+        }
+        has_room
+    }
+
+    fn uart_interrupt_on_room(on: bool) {
+        // SAFETY: nothing else uses the UART.
+        let uart = unsafe { &*pac::USART1::ptr() };
+        uart.cr1().modify(|_, w| w.txeie().bit(on));
     }
 }

@@ -1,12 +1,13 @@
 //! Nucleo-G474RE: STM32G474 (Cortex-M4F). It builds and passes the proofs of the link; no emulator
 //! has this chip.
 //!
-//! TIM3's first channel, on pin PA6, is the servo's PWM. TIM2 counts the cost of the tasks. USART1,
-//! on PC4 and PC5, links a host. All clocks are the 16 MHz of the internal oscillator, which the
+//! TIM3's first channel, on pin PA6, is the servo's PWM, PA7 enables its bridge. TIM2 counts the cost
+//! of the tasks. USART1, on PC4 and PC5, is the bus. All clocks are the 16 MHz of the internal oscillator, which the
 //! chip has after a reset.
 
 use super::{Board, BoardError, systick};
-use stm32g4xx_hal::gpio::{AF2, PA6};
+use shared_model::diagnostic::ResetCause;
+use stm32g4xx_hal::gpio::{AF2, Output, PA6, PA7, PushPull};
 use stm32g4xx_hal::independent_watchdog::IndependentWatchdog;
 use stm32g4xx_hal::prelude::*;
 use stm32g4xx_hal::pwm::{ActiveHigh, C1, ComplementaryImpossible, Pwm, PwmAdvExt};
@@ -25,12 +26,34 @@ pub struct NucleoG474re;
 
 impl Board for NucleoG474re {
     type Pwm = Pwm<pac::TIM3, C1, ComplementaryImpossible, ActiveHigh, ActiveHigh>;
+    type Bridge = PA7<Output<PushPull>>;
 
+    const NAME: &str = "nucleog474re";
     const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
     const COST_CLOCK_HZ: u32 = CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = 0;
+    const UART_INTERRUPTS: &[u16] = &[pac::Interrupt::USART1 as u16];
 
-    fn start_pwm(period: u16) -> Result<Self::Pwm, BoardError> {
+    fn reset_cause() -> ResetCause {
+        // SAFETY: a read and a write of the flags' register; nothing else uses them.
+        let rcc = unsafe { &*pac::RCC::ptr() };
+        let flags = rcc.csr().read();
+        let cause = if flags.borrstf().bit() {
+            ResetCause::Power
+        } else if flags.iwdgrstf().bit() || flags.wwdgrstf().bit() {
+            ResetCause::Watchdog
+        } else if flags.sftrstf().bit() {
+            ResetCause::Program
+        } else if flags.pinrstf().bit() {
+            ResetCause::Pin
+        } else {
+            ResetCause::Unknown
+        };
+        rcc.csr().modify(|_, w| w.rmvf().set_bit());
+        cause
+    }
+
+    fn start_pwm(period: u16) -> Result<(Self::Pwm, Self::Bridge), BoardError> {
         let chip = pac::Peripherals::take().ok_or(BoardError)?;
         let mut core = cortex_m::Peripherals::take().ok_or(BoardError)?;
         let mut rcc = chip.RCC.constrain();
@@ -49,7 +72,14 @@ impl Board for NucleoG474re {
         // Right after the restart of the period, so that the interrupt writes a duty early in a
         // period and it is taken over at that period's end, never ambiguous between two.
         systick::start(&mut core.SYST, period);
-        Ok(pwm)
+        Ok((pwm, pins.pa7.into_push_pull_output()))
+    }
+
+    fn disable_bridge() {
+        // SAFETY: a write to a register that changes one pin alone. Without the port's clock, as
+        // before the start, it does nothing, and the pin is an input: the bridge's pull-down has it.
+        let port = unsafe { &*pac::GPIOA::ptr() };
+        port.bsrr().write(|w| w.br7().set_bit());
     }
 
     fn neutralise_pwm() {
@@ -101,24 +131,42 @@ impl Board for NucleoG474re {
             .modify(|_, w| w.moder4().alternate().moder5().alternate());
         // SAFETY: a divider that the UART takes.
         uart.brr().write(|w| unsafe { w.bits(UART_DIVIDER) });
-        uart.cr1()
-            .write(|w| w.ue().set_bit().te().set_bit().re().set_bit());
-    }
-
-    fn uart_send(byte: u8) {
-        // SAFETY: nothing else uses the UART.
-        let uart = unsafe { &*pac::USART1::ptr() };
-        while uart.isr().read().txe().bit_is_clear() {}
-        uart.tdr().write(|w| {
-            // SAFETY: the register takes any byte.
-            unsafe { w.bits(byte.into()) }
+        // With its eight bytes of buffer.
+        uart.cr1().write(|w| {
+            let w = w.ue().set_bit().te().set_bit().re().set_bit();
+            w.fifoen().set_bit().rxneie().set_bit()
         });
     }
 
     fn uart_receive() -> Option<u8> {
         // SAFETY: nothing else uses the UART; reading the data takes the byte out.
         let uart = unsafe { &*pac::USART1::ptr() };
-        let is_full = uart.isr().read().rxne().bit_is_set();
-        is_full.then(|| uart.rdr().read().bits() as u8)
+        let state = uart.isr().read();
+        let has_error = state.ore().bit() || state.fe().bit() || state.ne().bit();
+        if has_error {
+            let clear = uart.icr();
+            clear.write(|w| w.orecf().set_bit().fecf().set_bit().ncf().set_bit());
+        }
+        let byte = state.rxne().bit().then(|| uart.rdr().read().bits() as u8);
+        byte.filter(|_| !has_error)
+    }
+
+    fn uart_send(byte: u8) -> bool {
+        // SAFETY: nothing else uses the UART.
+        let uart = unsafe { &*pac::USART1::ptr() };
+        let has_room = uart.isr().read().txe().bit_is_set();
+        if has_room {
+            uart.tdr().write(|w| {
+                // SAFETY: the register takes any byte.
+                unsafe { w.bits(byte.into()) }
+            });
+        }
+        has_room
+    }
+
+    fn uart_interrupt_on_room(on: bool) {
+        // SAFETY: nothing else uses the UART.
+        let uart = unsafe { &*pac::USART1::ptr() };
+        uart.cr1().modify(|_, w| w.txeie().bit(on));
     }
 }

@@ -38,6 +38,8 @@ pub struct Function {
     pub calls: BTreeSet<u32>,
     /// Calls through a pointer.
     pub indirect_calls: u32,
+    /// Breakpoint instructions, which are faults without a debugger.
+    pub breakpoints: u32,
     /// Branches to addresses outside all functions.
     pub strays: Vec<u32>,
 }
@@ -137,6 +139,7 @@ impl CallGraph {
                 }
                 Effect::SetStackPointer => swept.sets_stack_pointer = true,
                 Effect::Indirect => swept.indirect_calls += 1,
+                Effect::Breakpoint => swept.breakpoints += 1,
                 Effect::Branch(target) if range.contains(&target) => {}
                 Effect::Call(target) | Effect::Branch(target) => {
                     if self.functions.contains_key(&target) {

@@ -2,6 +2,7 @@
 
 use crate::budget;
 use files::input::{self, IMAGE_BYTES};
+use object::read::elf::ProgramHeader;
 use object::{Architecture, Object, ObjectSection, ObjectSymbol, SectionFlags, elf};
 use std::path::{Path, PathBuf};
 
@@ -102,6 +103,37 @@ impl Image {
         // The lowest bit of a function's symbol marks Thumb code and is not part of the address.
         let thumb = u64::from(symbol.kind() == object::SymbolKind::Text);
         u32::try_from(symbol.address() & !thumb).ok()
+    }
+
+    /// Place of a section's content in the file's bytes; `None` if the image has no such section,
+    /// or it has no content.
+    pub fn place_of(&self, section: &str) -> Option<std::ops::Range<usize>> {
+        let file = object::File::parse(&*self.bytes).ok()?;
+        let (start, length) = file.section_by_name(section)?.file_range()?;
+        let start = usize::try_from(start).ok()?;
+        let end = start.checked_add(usize::try_from(length).ok()?)?;
+        (end <= self.bytes.len()).then_some(start..end)
+    }
+
+    /// Content of the flash: for each part that is loaded, its first address and its bytes, in the
+    /// order of addresses.
+    pub fn flash(&self) -> Vec<(u32, &[u8])> {
+        let Ok(object::File::Elf32(file)) = object::File::parse(&*self.bytes) else {
+            return Vec::new();
+        };
+        let endian = file.endian();
+        let mut parts: Vec<(u32, &[u8])> = file
+            .elf_program_headers()
+            .iter()
+            .filter(|header| header.p_type(endian) == elf::PT_LOAD)
+            .filter_map(|header| {
+                let bytes = header.data(endian, &*self.bytes).ok()?;
+                Some((header.p_paddr(endian), bytes))
+            })
+            .filter(|(_, bytes)| !bytes.is_empty())
+            .collect();
+        parts.sort_by_key(|(address, _)| *address);
+        parts
     }
 
     /// All functions and variables.

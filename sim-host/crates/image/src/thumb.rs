@@ -24,6 +24,8 @@ pub enum Effect {
     Branch(u32),
     /// Calls or branches to a function whose address is in a register or in memory.
     Indirect,
+    /// Stops for a debugger; without one it is a fault. Semihosting calls are of this kind.
+    Breakpoint,
     /// Loads a constant into the lower half of a register and clears the upper half.
     LowHalf(u32, u32),
     /// Loads a constant into the upper half of a register.
@@ -62,6 +64,8 @@ fn narrow(address: u32, code: u32) -> Effect {
         _ if code & 0xF000 == 0xD000 && code & 0x0E00 != 0x0E00 => {
             branch(address, sign_extend(code << 1, 9), 32)
         }
+        // BKPT
+        _ if code & 0xFF00 == 0xBE00 => Effect::Breakpoint,
         // B
         _ if code & 0xF800 == 0xE000 => branch(address, sign_extend(code << 1, 12), 32),
         _ => Effect::None,

@@ -1,7 +1,9 @@
 //! The ECU in the loop: model (MIL), software (SIL) or processor (PIL).
 
+use qemu::bus_session::BusSession;
 use qemu::session::Session;
 use qemu::{Finished, RunError};
+use shared_model::bus::Message;
 use shared_model::controller::{Command, Controller};
 use shared_model::dither::Oscillator;
 use shared_model::e2e::Sender;
@@ -11,6 +13,7 @@ use shared_model::gate::{Limiter, Observation, Setpoint, Supervisor};
 use shared_model::servo::Pwm;
 use shared_model::signal::{Actuation, Measurement};
 use shared_model::{InvalidScenario, Real, Scenario, ecu};
+use std::collections::VecDeque;
 
 /// Rate of an ideal clock, Hz.
 const CLOCK_HZ: u32 = 25_000_000;
@@ -195,5 +198,60 @@ impl Ecu for Processor {
             packet,
             stop: false,
         })
+    }
+}
+
+/// Processor in the loop on the product's image: a sensor frame in and an actuator frame out over
+/// the bus once per control tick. The duty codes are read from the emulated PWM.
+pub struct OnBus {
+    session: BusSession,
+    /// Duty codes of the tick, not yet passed on.
+    duties: VecDeque<u16>,
+    /// The frame of the tick, due with its last duty.
+    frame: Option<FrameBytes>,
+}
+
+impl OnBus {
+    /// The firmware of a new session.
+    pub fn new(session: BusSession) -> Self {
+        Self {
+            session,
+            duties: VecDeque::new(),
+            frame: None,
+        }
+    }
+
+    /// The session.
+    pub fn session(&mut self) -> &mut BusSession {
+        &mut self.session
+    }
+
+    /// Ends the run and returns the firmware's log.
+    ///
+    /// # Errors
+    /// If the emulator does not answer.
+    pub fn finish(self) -> Result<Vec<String>, RunError> {
+        self.session.finish()
+    }
+}
+
+impl Ecu for OnBus {
+    fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
+        if self.duties.is_empty() {
+            let tick = self.session.tick()?;
+            self.duties = tick.duties.into();
+            self.frame = tick.frames.last().copied();
+        }
+        // The ECU stops with a tick, and a tick has at least one period.
+        let duty_code = self.duties.pop_front().unwrap_or_default();
+        let is_last = self.duties.is_empty();
+        let reply = answer(&Packet {
+            duty_code,
+            frame: self.frame.take_if(|_| is_last),
+        });
+        match reply.frame {
+            Some(frame) => self.session.send(Message::Sensor, &frame),
+            None => Ok(()),
+        }
     }
 }

@@ -3,11 +3,13 @@
 
 use super::closed_loop::{Exchange, Run, run};
 use super::comparison::{Comparison, Depth, compare};
-use super::ecu::{Model, Processor, Software};
+use super::ecu::{Model, OnBus, Processor, Software};
 use super::manoeuvre::Manoeuvre;
 use super::plant::InvalidPlant;
 use super::vehicle_node::{VehicleNode, ecu_scenario};
 use image::Image;
+use qemu::bus_session::BusSession;
+use qemu::configured::configured;
 use qemu::session::{LinkKind, Session};
 use qemu::settings;
 use qemu::{Machine, RunError, meaning};
@@ -41,7 +43,7 @@ pub enum LoopError {
     Run(#[from] RunError),
     /// The image lacks a symbol or an instruction of this firmware.
     #[error(
-        "the image has no {name}: it must be the firmware `ecu`; build it with `cargo xtask firmware`"
+        "the image has no {name}: it must be this project's firmware (`ecu` for the link uart, `bench` for all others); build it with `cargo xtask firmware`"
     )]
     NoSymbol {
         /// Name of the symbol or instruction.
@@ -63,7 +65,7 @@ pub struct ProcessorRun {
     /// Elapsed time.
     pub elapsed: Duration,
     /// Counts of the PWM task (the maximum of one period) and of the control task, one pair per
-    /// control tick.
+    /// control tick; none from the product's image.
     pub costs: Vec<(u16, u16)>,
     /// The firmware's log.
     pub log: Vec<String>,
@@ -150,6 +152,9 @@ pub fn on_processor(
     target: &Target,
     on_period: impl FnMut(),
 ) -> Result<ProcessorRun, LoopError> {
+    if target.link == LinkKind::Uart {
+        return on_bus(ecu, vehicle, target, on_period);
+    }
     let session = Session::start(
         &target.image,
         target.machine,
@@ -174,6 +179,30 @@ pub fn on_processor(
         elapsed,
         costs,
         log: ended.log,
+    })
+}
+
+/// On the product's image, configured with the scenario.
+fn on_bus(
+    ecu: &Scenario<f32>,
+    vehicle: VehicleNode,
+    target: &Target,
+    on_period: impl FnMut(),
+) -> Result<ProcessorRun, LoopError> {
+    let image = configured(&target.image, ecu, target.machine.board());
+    let image = image.ok_or(LoopError::NoSymbol {
+        name: "configuration section",
+    })?;
+    let session = BusSession::start(&image, target.machine, target.time_out)?;
+    let mut processor = OnBus::new(session);
+    let start = Instant::now();
+    let run = run(&mut processor, vehicle, on_period)?;
+    let elapsed = start.elapsed();
+    Ok(ProcessorRun {
+        run,
+        elapsed,
+        costs: Vec::new(),
+        log: processor.finish()?,
     })
 }
 

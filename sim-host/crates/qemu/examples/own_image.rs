@@ -2,7 +2,7 @@
 //!
 //! `cargo xtask firmware`, then
 //! `cargo run --release -p dithersteer-qemu --example own_image --
-//! target/thumbv7em-none-eabihf/firmware/ecu`
+//! target/thumbv7em-none-eabihf/firmware/bench`
 
 use image::Image;
 use qemu::Machine;

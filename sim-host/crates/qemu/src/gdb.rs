@@ -113,18 +113,48 @@ impl Gdb {
         let here = self.read_register(Register::Pc)?;
         // A breakpoint at this address would stop the core again immediately.
         if self.breakpoints.contains(&here) {
-            self.remove_breakpoint(here)?;
-            let stop = self.go("s", limit)?;
-            if stop != Stop::Breakpoint {
-                return Ok(stop);
-            }
-            self.set_breakpoint(here)?;
+            return self.run_on_from(here, limit);
         }
+        self.go("c", limit)
+    }
+
+    /// As [`run_to_stop`](Self::run_to_stop), for a core that is known to be at the breakpoint
+    /// `here`.
+    ///
+    /// # Errors
+    /// As [`run_to_stop`](Self::run_to_stop).
+    pub(crate) fn run_on_from(&mut self, here: u32, limit: Duration) -> Result<Stop, SocketError> {
+        self.remove_breakpoint(here)?;
+        let stop = self.go("s", limit)?;
+        if stop != Stop::Breakpoint {
+            return Ok(stop);
+        }
+        self.set_breakpoint(here)?;
         self.go("c", limit)
     }
 
     fn go(&mut self, how: &str, limit: Duration) -> Result<Stop, SocketError> {
         self.send(how)?;
+        self.wait_for_stop(limit)
+    }
+
+    /// Runs the core for `duration` of the host's time, or to a stop before that; stops it then and
+    /// waits for that at most `limit`.
+    pub(crate) fn run_for(
+        &mut self,
+        duration: Duration,
+        limit: Duration,
+    ) -> Result<Stop, SocketError> {
+        /// The protocol's request to stop, which is no packet.
+        const INTERRUPT: u8 = 3;
+        self.send("c")?;
+        std::thread::sleep(duration);
+        self.socket.write(&[INTERRUPT])?;
+        self.wait_for_stop(limit)
+    }
+
+    /// Waits at most `limit` for the report of a stop.
+    fn wait_for_stop(&mut self, limit: Duration) -> Result<Stop, SocketError> {
         let usual = self.socket.limit();
         self.socket.wait_at_most(limit)?;
         let answer = self.receive()?;

@@ -5,12 +5,16 @@ compile_error!(
     "qemu needs Linux: it ends the emulator with itself, and keeps both on one core, by Linux's own calls"
 );
 
+pub mod bus_session;
+pub mod configured;
 pub mod debug;
 mod emulator;
 pub mod gdb;
 pub mod log;
 mod machine;
+mod pipes;
 pub mod qmp;
+mod rtt;
 mod run;
 pub mod session;
 pub mod settings;

@@ -64,25 +64,42 @@ impl LogDecoder {
     /// readable.
     pub fn decode(&self, mut console: impl std::io::Read, mut on_line: impl FnMut(&str)) {
         let mut buffer = [0; 4096];
-        let mut frame = Vec::with_capacity(FRAME_BYTES);
-        let mut is_too_long = false;
+        let mut stream = Stream::default();
         while let Ok(length @ 1..) = console.read(&mut buffer) {
-            let Some(table) = &self.table else { continue };
-            for piece in buffer[..length].split_inclusive(|&byte| byte == 0) {
-                is_too_long |= frame.len() + piece.len() > FRAME_BYTES;
-                if !is_too_long {
-                    frame.extend_from_slice(piece);
+            self.decode_some(&mut stream, &buffer[..length], &mut on_line);
+        }
+    }
+
+    /// Decodes the next bytes of a log.
+    pub(crate) fn decode_some(
+        &self,
+        stream: &mut Stream,
+        bytes: &[u8],
+        mut on_line: impl FnMut(&str),
+    ) {
+        let Some(table) = &self.table else { return };
+        let Stream { frame, is_too_long } = stream;
+        for piece in bytes.split_inclusive(|&byte| byte == 0) {
+            *is_too_long |= frame.len() + piece.len() > FRAME_BYTES;
+            if !*is_too_long {
+                frame.extend_from_slice(piece);
+            }
+            if piece.ends_with(&[0]) {
+                match std::mem::take(is_too_long) {
+                    true => on_line(DAMAGED),
+                    false => decode_frame(table, frame, &mut on_line),
                 }
-                if piece.ends_with(&[0]) {
-                    match std::mem::take(&mut is_too_long) {
-                        true => on_line(DAMAGED),
-                        false => decode_frame(table, &frame, &mut on_line),
-                    }
-                    frame.clear();
-                }
+                frame.clear();
             }
         }
     }
+}
+
+/// The frame of a log that is not complete yet.
+#[derive(Debug, Default)]
+pub(crate) struct Stream {
+    frame: Vec<u8>,
+    is_too_long: bool,
 }
 
 /// A frame with its terminating zero; consecutive zeros end one frame.
@@ -115,6 +132,11 @@ impl Lines {
             self.0.pop_front();
         }
         self.0.push_back(line.into());
+    }
+
+    /// The last line.
+    pub(crate) fn last(&self) -> String {
+        self.0.back().cloned().unwrap_or_else(|| "(none)".into())
     }
 
     pub(crate) fn into_vec(self) -> Vec<String> {

@@ -32,12 +32,12 @@ impl Machine {
         }
     }
 
-    /// The emulator's options that connect `line` to the UART of the board's firmware.
-    pub(crate) fn serial_options(self, line: &str) -> Vec<&str> {
+    /// The emulator's options that connect a character device to the UART of the board's firmware.
+    pub(crate) fn serial_options(self, device: &str) -> Vec<&str> {
         match self {
-            // UART 0 is the console; UART 1 is the link.
-            Self::Mps2An386 | Self::Mps2An500 => vec!["-serial", "null", "-serial", line],
-            Self::NetduinoPlus2 => vec!["-serial", line],
+            // UART 0 is the console; UART 1 is the bus.
+            Self::Mps2An386 | Self::Mps2An500 => vec!["-serial", "null", "-serial", device],
+            Self::NetduinoPlus2 => vec!["-serial", device],
         }
     }
 

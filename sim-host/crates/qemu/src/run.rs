@@ -78,6 +78,14 @@ pub enum RunError {
         /// The last log line.
         last_line: String,
     },
+    /// The image lacks a symbol of this firmware.
+    #[error(
+        "the image has no {name}: it must be this project's image `ecu`; build it with `cargo xtask firmware`"
+    )]
+    NoSymbol {
+        /// Name of the symbol.
+        name: &'static str,
+    },
     /// The log's symbols are invalid.
     #[error("cannot decode the firmware's log: {0}")]
     Log(#[from] LogError),
@@ -191,7 +199,7 @@ pub(crate) fn attend(
 /// Options of an emulator without serial lines.
 pub(crate) const SILENT: &[&str] = &["-serial", "none"];
 
-/// Starts the emulator with additional `options`.
+/// Starts the emulator with semihosting, the scenario's settings and additional `options`.
 pub(crate) fn start(
     image: &Image,
     machine: Machine,
@@ -204,7 +212,18 @@ pub(crate) fn start(
         // A comma ends an option of the emulator; a double comma is a literal one.
         semihosting += &format!(",arg={}", setting.replace(',', ",,"));
     }
-    let image = std::path::absolute(&image.path).map_err(RunError::NotStarted)?;
+    let options = [options, &["-semihosting-config", &semihosting]].concat();
+    start_alone(&image.path, machine, directory, &options)
+}
+
+/// Starts the emulator without semihosting, with additional `options`.
+pub(crate) fn start_alone(
+    elf: &Path,
+    machine: Machine,
+    directory: &Path,
+    options: &[&str],
+) -> Result<Emulator, RunError> {
+    let elf = std::path::absolute(elf).map_err(RunError::NotStarted)?;
     let mut command = Command::new(PROGRAM);
     command
         .args(["-machine", machine.name(), "-display", "none"])
@@ -215,9 +234,8 @@ pub(crate) fn start(
             machine.instruction_shift()
         ))
         .args(options)
-        .args(["-semihosting-config", &semihosting])
         .arg("-kernel")
-        .arg(image)
+        .arg(elf)
         .current_dir(directory)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())

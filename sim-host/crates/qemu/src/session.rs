@@ -1,19 +1,15 @@
 //! The ECU in the emulator with one exchange per PWM period: the host replaces its servo and
 //! sensors.
 
-use crate::emulator::{Emulator, first_words, is_ready};
+use crate::emulator::{Emulator, first_words};
 use crate::log::{Lines, LogDecoder};
 use crate::machine::Machine;
+use crate::pipes::{make_pipe, open_without_waiting, read_exact, write_all};
 use crate::run::{self, Finished, RunError};
 use image::Image;
-use rustix::event::PollFlags;
 use shared_model::exchange::{TO_HOST_LEN, ToEcu, ToHost};
-use shared_model::serial::{self, Deframer, Received};
-use std::fs::{File, OpenOptions};
-use std::io::{ErrorKind, Read, Write};
-use std::os::fd::OwnedFd;
-use std::os::unix::fs::OpenOptionsExt;
-use std::os::unix::net::UnixStream;
+use std::fs::File;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::sync::{Arc, Mutex};
@@ -23,10 +19,7 @@ use std::time::{Duration, Instant};
 /// Names of the pipes in the working directory, as in the firmware.
 const TO_HOST: &str = "to-host";
 const TO_ECU: &str = "to-ecu";
-const UART_SOCKET: &str = "uart";
 const POLL: Duration = Duration::from_millis(2);
-/// Longest wait between two checks for an interruption.
-const LOOK: Duration = Duration::from_millis(100);
 
 /// Part of the emulator's message when a fault occurs within a fault handler (lockup).
 const LOCKUP: &str = "Lockup";
@@ -39,7 +32,7 @@ pub enum LinkKind {
     /// The same, but the board's timer starts each PWM period, and the gate measures the time
     /// between control ticks.
     Timed,
-    /// The board's UART, framed, with the host's timing: realistic and slow.
+    /// The product's image, over its UART; see [`crate::bus_session`].
     Uart,
 }
 
@@ -61,7 +54,7 @@ impl LinkKind {
         match self {
             Self::Files => "pipes at the host's pace: fast",
             Self::Timed => "pipes at the pace of the board's timer, whose ticks the gate measures",
-            Self::Uart => "the board's UART, framed, at the host's pace: realistic and slow",
+            Self::Uart => "the image `ecu`, over its UART at the pace of its timer",
         }
     }
 
@@ -70,11 +63,10 @@ impl LinkKind {
     }
 }
 
-/// Both directions of the link, non-blocking, and the deframer.
+/// Both directions of the link, non-blocking.
 struct Transport {
     from_ecu: File,
     to_ecu: File,
-    deframer: Option<Deframer>,
 }
 
 /// An ECU in the emulator that waits for the vehicle's answer. Dropping it ends the emulator.
@@ -181,18 +173,12 @@ impl Session {
         }
         let mut settings = settings.to_vec();
         settings.push(link.setting());
-        let socket = directory.path().join(UART_SOCKET);
-        let line = format!("unix:{},server=on,wait=on", socket.display());
-        let serial = match link {
-            LinkKind::Files | LinkKind::Timed => run::SILENT.to_vec(),
-            LinkKind::Uart => machine.serial_options(&line),
-        };
-        let waiting = prepare(link, directory.path())?;
-        let options = [&serial, options].concat();
+        let pipes = Pipes::make(directory.path())?;
+        let options = [run::SILENT, options].concat();
         let emulator = run::start(image, machine, &settings, directory.path(), &options)?;
         let mut attended = Attended::new(emulator, decoder);
         Ok(Self {
-            transport: waiting.open(&mut attended, limit)?,
+            transport: pipes.open(&mut attended, limit)?,
             attended,
             limit,
             _directory: directory,
@@ -236,67 +222,33 @@ impl Session {
     }
 }
 
-/// Resources that must exist before the emulator starts.
-enum Waiting {
-    Files { from_ecu: File, to_ecu: PathBuf },
-    Uart { socket: PathBuf },
+/// The pipes, which must exist before the emulator starts.
+struct Pipes {
+    from_ecu: File,
+    to_ecu: PathBuf,
 }
 
-fn prepare(link: LinkKind, directory: &Path) -> Result<Waiting, RunError> {
-    match link {
-        LinkKind::Files | LinkKind::Timed => {
-            for name in [TO_HOST, TO_ECU] {
-                make_pipe(&directory.join(name))?;
-            }
-            // The emulator opens the other end later.
-            let from_ecu = open_without_waiting(&directory.join(TO_HOST), true);
-            Ok(Waiting::Files {
-                from_ecu: from_ecu.map_err(RunError::NotStarted)?,
-                to_ecu: directory.join(TO_ECU),
-            })
+impl Pipes {
+    fn make(directory: &Path) -> Result<Self, RunError> {
+        for name in [TO_HOST, TO_ECU] {
+            make_pipe(&directory.join(name))?;
         }
-        LinkKind::Uart => Ok(Waiting::Uart {
-            socket: directory.join(UART_SOCKET),
-        }),
+        // The emulator opens the other end later.
+        let from_ecu = open_without_waiting(&directory.join(TO_HOST), true);
+        Ok(Self {
+            from_ecu: from_ecu.map_err(RunError::NotStarted)?,
+            to_ecu: directory.join(TO_ECU),
+        })
     }
-}
 
-fn make_pipe(path: &Path) -> Result<(), RunError> {
-    use rustix::fs::{CWD, FileType, Mode, mknodat};
-    mknodat(CWD, path, FileType::Fifo, Mode::RUSR | Mode::WUSR, 0)
-        .map_err(|error| RunError::NotStarted(error.into()))
-}
-
-fn open_without_waiting(path: &Path, read: bool) -> std::io::Result<File> {
-    OpenOptions::new()
-        .read(read)
-        .write(!read)
-        .custom_flags(rustix::fs::OFlags::NONBLOCK.bits() as i32)
-        .open(path)
-}
-
-impl Waiting {
     /// Opens the link after the emulator has opened its end.
     fn open(self, attended: &mut Attended, limit: Duration) -> Result<Transport, RunError> {
-        match self {
-            Self::Files { from_ecu, to_ecu } => Ok(Transport {
-                from_ecu,
-                to_ecu: retry(attended, limit, || open_without_waiting(&to_ecu, false))?,
-                deframer: None,
-            }),
-            Self::Uart { socket } => {
-                let stream = retry(attended, limit, || UnixStream::connect(&socket))?;
-                let transport = || {
-                    stream.set_nonblocking(true)?;
-                    Ok(Transport {
-                        to_ecu: OwnedFd::from(stream.try_clone()?).into(),
-                        from_ecu: OwnedFd::from(stream).into(),
-                        deframer: Some(Deframer::new()),
-                    })
-                };
-                transport().map_err(RunError::NotStarted)
-            }
-        }
+        Ok(Transport {
+            from_ecu: self.from_ecu,
+            to_ecu: retry(attended, limit, || {
+                open_without_waiting(&self.to_ecu, false)
+            })?,
+        })
     }
 }
 
@@ -328,123 +280,11 @@ fn retry<T>(
 impl Transport {
     fn receive(&mut self, limit: Duration) -> std::io::Result<ToHost> {
         let mut bytes = [0; TO_HOST_LEN];
-        match &mut self.deframer {
-            None => read_exact(&mut self.from_ecu, limit, &mut bytes)?,
-            Some(deframer) => receive_packet(&mut self.from_ecu, deframer, limit, &mut bytes)?,
-        }
+        read_exact(&mut self.from_ecu, limit, &mut bytes)?;
         Ok(ToHost::decode(&bytes))
     }
 
     fn send(&mut self, answer: &ToEcu, limit: Duration) -> std::io::Result<()> {
-        let bytes = answer.encode();
-        if self.deframer.is_none() {
-            return write_all(&mut self.to_ecu, limit, &bytes);
-        }
-        let mut packet = Vec::with_capacity(bytes.len() + 4);
-        serial::frame(&bytes, |byte| packet.push(byte));
-        write_all(&mut self.to_ecu, limit, &packet)
-    }
-}
-
-/// Fills `bytes`, waiting at most `limit` for each part, because a faulty ECU may stop in the
-/// middle of a packet.
-fn read_exact(file: &mut File, limit: Duration, mut bytes: &mut [u8]) -> std::io::Result<()> {
-    while !bytes.is_empty() {
-        let length = read_some(file, limit, bytes)?;
-        bytes = &mut bytes[length..];
-    }
-    Ok(())
-}
-
-fn read_some(file: &mut File, limit: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
-    wait_until_ready(file, PollFlags::IN, limit)?;
-    match file.read(bytes)? {
-        0 => Err(ErrorKind::UnexpectedEof.into()),
-        length => Ok(length),
-    }
-}
-
-fn write_all(file: &mut File, limit: Duration, mut bytes: &[u8]) -> std::io::Result<()> {
-    while !bytes.is_empty() {
-        match file.write(bytes) {
-            Ok(length) => bytes = &bytes[length..],
-            // The pipe is full if the emulator reads nothing.
-            Err(error) if error.kind() == ErrorKind::WouldBlock => {
-                wait_until_ready(file, PollFlags::OUT, limit)?;
-            }
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(())
-}
-
-/// Waits at most `limit`, or until the user interrupts.
-fn wait_until_ready(file: &File, flags: PollFlags, limit: Duration) -> std::io::Result<()> {
-    // The clock is read only if the answer is not immediate.
-    if is_ready(file, flags, limit.min(LOOK))? {
-        return Ok(());
-    }
-    let start = Instant::now();
-    let limit = limit.saturating_sub(LOOK);
-    loop {
-        if interrupt::requested() {
-            return Err(ErrorKind::Interrupted.into());
-        }
-        let left = limit.saturating_sub(start.elapsed());
-        if is_ready(file, flags, left.min(LOOK))? {
-            return Ok(());
-        }
-        if left.is_zero() {
-            return Err(ErrorKind::TimedOut.into());
-        }
-    }
-}
-
-fn receive_packet(
-    file: &mut File,
-    deframer: &mut Deframer,
-    limit: Duration,
-    bytes: &mut [u8; TO_HOST_LEN],
-) -> std::io::Result<()> {
-    let mut buffer = [0; 64];
-    // Much more than a packet, plus the bytes that may precede the first.
-    for _ in 0..64 {
-        // The ECU sends nothing after its packet until it is answered, so no byte of a later packet
-        // is read.
-        let length = read_some(file, limit, &mut buffer)?;
-        for &byte in &buffer[..length] {
-            match deframer.push(byte) {
-                Received::Nothing => {}
-                Received::Damaged => return Err(ErrorKind::InvalidData.into()),
-                Received::Body(body) => {
-                    *bytes = body.try_into().map_err(|_| ErrorKind::InvalidData)?;
-                    return Ok(());
-                }
-            }
-        }
-    }
-    Err(ErrorKind::InvalidData.into())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::os::fd::OwnedFd;
-
-    #[test]
-    fn half_a_packet_ends_with_the_limit_and_a_closed_link_at_once() {
-        let (ours, mut theirs) = std::io::pipe().expect("a pipe can be made");
-        let mut ours = File::from(OwnedFd::from(ours));
-        let mut read = || {
-            let mut bytes = [0; TO_HOST_LEN];
-            read_exact(&mut ours, Duration::from_millis(20), &mut bytes)
-                .map_err(|error| error.kind())
-        };
-        theirs.write_all(&[0; TO_HOST_LEN]).expect("it takes them");
-        assert_eq!(read(), Ok(()));
-        theirs.write_all(&[0; 2]).expect("it takes them");
-        assert_eq!(read(), Err(ErrorKind::TimedOut));
-        drop(theirs);
-        assert_eq!(read(), Err(ErrorKind::UnexpectedEof));
+        write_all(&mut self.to_ecu, limit, &answer.encode())
     }
 }

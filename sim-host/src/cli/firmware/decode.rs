@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// CSV.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sim-host firmware run target/thumbv7em-none-eabihf/firmware/ecu \\
+  sim-host firmware run target/thumbv7em-none-eabihf/firmware/bench \\
       telemetry=decode.bin run.duration_s=5
   sim-host firmware decode decode.bin --out decode.csv")]
 pub struct Arguments {

@@ -21,7 +21,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   cargo xtask proofs
   sim-host firmware image --json stack.json \\
-      target/stack-sizes/mps2/thumbv7em-none-eabihf/firmware/ecu
+      target/thumbv7em-none-eabihf/firmware/bench
 
 The exit code is 1 if there is no bound (recursion, unknown frames), or if it exceeds the RAM.")]
 pub struct Arguments {

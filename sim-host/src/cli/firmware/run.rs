@@ -18,12 +18,12 @@ use toml::{Table, Value};
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples (cargo runs this from firmware/: `cargo run -- SETTINGS`):
-  sim-host firmware run target/thumbv7em-none-eabihf/firmware/ecu \\
+  sim-host firmware run target/thumbv7em-none-eabihf/firmware/bench \\
       run.wheel_speed_rpm=1600
-  sim-host firmware run target/thumbv7em-none-eabihf/firmware/ecu \\
+  sim-host firmware run target/thumbv7em-none-eabihf/firmware/bench \\
       dither.waveform=sine dither.amplitude_v=1 telemetry=run.bin
   sim-host firmware run --machine mps2-an500 --time-out 60 \\
-      target/thumbv7em-none-eabihf/firmware/ecu run.duration_s=5
+      target/thumbv7em-none-eabihf/firmware/bench run.duration_s=5
 
 Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME and telemetry=FILE.
 Exit codes are the firmware's: 0 complete, confirmed by log and telemetry; 10 scenario rejected, 11 telemetry, 12 overrun, 13 panic,

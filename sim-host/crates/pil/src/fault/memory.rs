@@ -15,7 +15,7 @@ const RAM_START: u32 = 0x2000_0000;
 /// Variables of the ECU's tasks, by a part of the symbol's name.
 const CONTROL_TASK: &str = "in_loop13place_control";
 const PWM_TASK: &str = "in_loop9place_pwm";
-const MAILBOXES: [&str; 2] = ["in_loop5INPUT", "in_loop6OUTPUT"];
+const MAILBOXES: [&str; 2] = ["steering5INPUT", "steering6OUTPUT"];
 
 /// `count` flips in each region, at random ticks in `ticks`. The probability of a variable is
 /// proportional to its size. A size above 64 bytes counts as 64 bytes, because most of the memory

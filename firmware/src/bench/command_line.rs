@@ -16,8 +16,19 @@ const LINK: &str = "link=";
 /// Key of a preset, which replaces the whole scenario.
 const PRESET: &str = "preset=";
 
+/// Key of a fault to provoke, which replaces the run; all other settings are ignored.
+const FAULT: &str = "fault=";
+
 /// Content of the command line.
-pub struct Command {
+pub enum Command {
+    /// A run.
+    Run(Run),
+    /// A fault to provoke, by its name.
+    Drill(&'static str),
+}
+
+/// A run's settings.
+pub struct Run {
     /// The scenario, not yet validated.
     pub scenario: Scenario<f32>,
     /// Path of the telemetry file on the host, if telemetry is requested.
@@ -44,7 +55,7 @@ pub fn read() -> Result<Command, CommandError> {
 
 /// The command line; `None` if the host has none or a longer one than the buffer, or at the second
 /// call.
-pub fn text() -> Option<&'static str> {
+fn text() -> Option<&'static str> {
     let buffer = cortex_m::singleton!(: [u8; MAX_BYTES] = [0; MAX_BYTES])?;
     let mut block = [buffer.as_mut_ptr() as usize, MAX_BYTES];
     // SAFETY: the operation writes at most MAX_BYTES bytes of the buffer and both words of the
@@ -55,26 +66,30 @@ pub fn text() -> Option<&'static str> {
 }
 
 fn parse(text: &'static str) -> Result<Command, CommandError> {
-    let mut command = Command {
+    let words = || text.split_ascii_whitespace().skip(1);
+    if let Some(name) = words().find_map(|word| word.strip_prefix(FAULT)) {
+        return Ok(Command::Drill(name));
+    }
+    let mut run = Run {
         scenario: Scenario::reconstruction(),
         telemetry: None,
         link: None,
     };
     let timer_clock_hz = Current::TIMER_CLOCK_HZ as f32;
-    command.scenario.servo.timer_clock_hz = timer_clock_hz;
-    for word in text.split_ascii_whitespace().skip(1) {
+    run.scenario.servo.timer_clock_hz = timer_clock_hz;
+    for word in words() {
         if let Some(path) = word.strip_prefix(TELEMETRY) {
-            command.telemetry = Some(path);
+            run.telemetry = Some(path);
         } else if let Some(name) = word.strip_prefix(LINK) {
-            command.link = Some(name);
+            run.link = Some(name);
         } else {
-            let applied = command.scenario.apply(word);
+            let applied = run.scenario.apply(word);
             applied.map_err(|error| CommandError::Setting(word, error))?;
         }
         // A preset is one for any board.
         if word.starts_with(PRESET) {
-            command.scenario.servo.timer_clock_hz = timer_clock_hz;
+            run.scenario.servo.timer_clock_hz = timer_clock_hz;
         }
     }
-    Ok(command)
+    Ok(Command::Run(run))
 }

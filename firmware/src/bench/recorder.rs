@@ -1,10 +1,10 @@
 //! Telemetry: rings from the interrupts to the main loop, and the stream from there to the host.
 
+use super::counters::{count_overrun, overruns, saturate};
+use super::host_file::{HostFile, HostFileError};
+use super::jitter;
 use crate::board::{Board, Current};
-use crate::counters::{count_overrun, overruns, saturate};
-use crate::exit::ExitCode;
-use crate::host_file::{HostFile, HostFileError};
-use crate::{jitter, stack};
+use crate::stack;
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use critical_section::Mutex;
@@ -143,12 +143,12 @@ impl Recorder {
     }
 }
 
-/// Writes the trailer, if a stream is open. Works from any handler: it needs no recorder; bytes
+/// Writes the trailer with the exit code, if a stream is open. Works from any handler: it needs no recorder; bytes
 /// that the recorder has gathered and not written are lost.
 ///
 /// # Errors
 /// If the host cannot write the file.
-pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
+pub fn finish(exit_code: u32) -> Result<(), HostFileError> {
     let handle = FILE.load(Ordering::Relaxed);
     if handle == NOT_OPEN {
         return Ok(());
@@ -156,7 +156,7 @@ pub fn finish(code: ExitCode) -> Result<(), HostFileError> {
     let (final_duty, neutral_duty) = Current::pwm_output();
     let (min_interval, max_interval) = jitter::interval_range();
     let trailer = Trailer {
-        exit_code: code as u32,
+        exit_code,
         records: RECORDS.load(Ordering::Relaxed),
         overruns: overruns(),
         stack_bytes: stack::deepest_bytes(),

@@ -1,13 +1,15 @@
 //! A run of the ECU from the command line to the exit code.
 
+use super::command_line::{self, Command};
+use super::exit::ExitCode;
+use super::host_file::HostFileError;
+use super::interrupts::{self, ControlInterrupt, PwmInterrupt};
+use super::link::{Link, Pace};
+use super::recorder::{self, Recorder};
+use super::refusal::{refuse_command, refuse_scenario, refuse_timer_clock};
+use super::{counters, drill, in_loop, open_loop, run_state};
 use crate::board::{Board, Current};
-use crate::exit::ExitCode;
-use crate::host_file::HostFileError;
-use crate::interrupts::{self, ControlInterrupt, PwmInterrupt};
-use crate::link::{Link, Pace};
-use crate::recorder::{self, Recorder};
-use crate::refusal::{refuse_command, refuse_scenario, refuse_timer_clock};
-use crate::{command_line, counters, in_loop, log, open_loop, stack, tasks};
+use crate::{stack, steering};
 use cortex_m::peripheral::SCB;
 use shared_model::Scenario;
 use shared_model::ecu::Ecu;
@@ -16,20 +18,18 @@ use shared_model::telemetry::Header;
 
 /// Runs the scenario of the command line to its end.
 pub fn run() -> ExitCode {
-    stack::guard();
-    stack::paint();
-    log::open();
-    let command = match command_line::read() {
-        Ok(command) => command,
+    let run = match command_line::read() {
+        Ok(Command::Run(run)) => run,
+        Ok(Command::Drill(name)) => return drill::run(name),
         Err(error) => return refuse_command(&error),
     };
-    let timer_clock_hz = command.scenario.servo.timer_clock_hz;
+    let timer_clock_hz = run.scenario.servo.timer_clock_hz;
     if timer_clock_hz != Current::TIMER_CLOCK_HZ as f32 {
         return refuse_timer_clock(timer_clock_hz);
     }
-    match command.link {
-        Some(link) => steer(&command.scenario, link),
-        None => simulate(&command.scenario, command.telemetry),
+    match run.link {
+        Some(link) => steer(&run.scenario, link),
+        None => simulate(&run.scenario, run.telemetry),
     }
 }
 
@@ -96,7 +96,7 @@ fn run_open_loop(
     };
     let period = neutral.period();
     let (task, control) = (ecu.pwm, ecu.control);
-    interrupts::start(period, scenario, scenario.step_s(), |pwm| {
+    interrupts::start(period, scenario, scenario.step_s(), |(pwm, _)| {
         let pwm = cortex_m::singleton!(: open_loop::PwmInterrupt = open_loop::PwmInterrupt {
             task,
             pwm,
@@ -114,7 +114,7 @@ fn run_open_loop(
         ))
     });
 
-    while !tasks::is_finished() {
+    while !run_state::is_finished() {
         if recorder.take_one()? {
             Current::feed_watchdog();
         } else {
@@ -132,24 +132,29 @@ fn run_in_loop(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode 
     let period = ecu.pwm.neutral().period();
     let tick_s = 1.0 / scenario.run.control_rate_hz;
     let pace = link.pace;
-    interrupts::start(period, scenario, tick_s, |pwm| {
+    interrupts::start(period, scenario, tick_s, |(pin, bridge)| {
         let pwm = in_loop::place_pwm(in_loop::PwmInterrupt {
-            task: ecu.pwm,
-            pwm,
+            steering: steering::Pwm {
+                task: ecu.pwm,
+                pin,
+                bridge,
+            },
             link,
             frame: None,
             last_tick_counts: Current::cost_counter(),
             nominal_counts: (Current::COST_CLOCK_HZ as f32 * tick_s) as u32,
         })?;
-        let control = in_loop::place_control(in_loop::ControlInterrupt { task: ecu.control })?;
+        let control = in_loop::place_control(in_loop::ControlInterrupt {
+            steering: steering::Control { task: ecu.control },
+        })?;
         Some((PwmInterrupt::InLoop(pwm), ControlInterrupt::InLoop(control)))
     });
     if pace == Pace::Host {
         Current::stop_pwm_interrupt();
     }
     let mut ticks_seen = 0;
-    while !tasks::is_finished() {
-        let ticks = in_loop::control_ticks();
+    while !run_state::is_finished() {
+        let ticks = steering::control_ticks();
         if ticks != ticks_seen {
             ticks_seen = ticks;
             Current::feed_watchdog();

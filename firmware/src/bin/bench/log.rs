@@ -4,9 +4,9 @@
 //! emulator. This one gathers a frame first. Fault handlers do not log: they may have interrupted a
 //! frame.
 
-use crate::host_file::HostFile;
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicUsize, Ordering};
+use firmware::bench::host_file::HostFile;
 
 /// Longer frames are written in pieces.
 const BUFFER_BYTES: usize = 256;
@@ -105,5 +105,3 @@ unsafe impl defmt::Logger for Logger {
         frame.encoder.write(bytes, |bytes| frame.buffer.push(bytes));
     }
 }
-
-defmt::timestamp!("{=u32:ms}", crate::clock::elapsed_ms());

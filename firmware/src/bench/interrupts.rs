@@ -1,16 +1,10 @@
-//! The two tasks as interrupts, whichever program runs in them.
-//!
-//! SysTick is the PWM interrupt, at high priority. Once per control period it pends the PendSV
-//! exception, at low priority, which runs the control task. So the two rates are locked, and the
-//! PWM interrupt preempts a control task that is still at work. Nothing here can panic: the binary
+//! The two tasks as interrupts, whichever program runs in them. Nothing here can panic: the binary
 //! `panic-free` proves it at link time.
 
+use super::{counters, in_loop, jitter, open_loop};
 use crate::board::{Board, Current};
-use crate::{clock, counters, in_loop, jitter, open_loop, tasks};
+use crate::{clock, tasks};
 use core::cell::Cell;
-use cortex_m::peripheral::SCB;
-use cortex_m::peripheral::scb::SystemHandler;
-use cortex_m_rt::exception;
 use critical_section::Mutex;
 use shared_model::Scenario;
 
@@ -18,9 +12,6 @@ use shared_model::Scenario;
 /// ms, if that is longer.
 const WATCHDOG_PERIODS: f32 = 4.0;
 const WATCHDOG_LEAST_MS: u32 = 20;
-/// Priorities as the registers have them; a lower number preempts a higher one.
-const PWM_PRIORITY: u8 = 0x00;
-const CONTROL_PRIORITY: u8 = 0xE0;
 
 static PWM_START: Mutex<Cell<Option<PwmInterrupt>>> = Mutex::new(Cell::new(None));
 static CONTROL_START: Mutex<Cell<Option<ControlInterrupt>>> = Mutex::new(Cell::new(None));
@@ -42,13 +33,16 @@ pub enum ControlInterrupt {
     InLoop(&'static mut in_loop::ControlInterrupt),
 }
 
+/// PWM and enable pin of the servo's bridge.
+type Servo = (<Current as Board>::Pwm, <Current as Board>::Bridge);
+
 /// Starts PWM, interrupts and watchdog; `tasks` makes the tasks of the two interrupts. The control
 /// task runs every `tick_s`.
 pub fn start(
     period: u16,
     scenario: &Scenario<f32>,
     tick_s: f32,
-    tasks: impl FnOnce(<Current as Board>::Pwm) -> Option<(PwmInterrupt, ControlInterrupt)>,
+    tasks: impl FnOnce(Servo) -> Option<(PwmInterrupt, ControlInterrupt)>,
 ) {
     let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * tick_s) as u32;
     let samples_per_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
@@ -58,7 +52,7 @@ pub fn start(
         if let Some((pwm, control)) = pwm.and_then(tasks) {
             hand_over(pwm, control, samples_per_ms);
         }
-        set_priorities();
+        tasks::set_priorities();
         Current::start_watchdog(timeout_ms.max(WATCHDOG_LEAST_MS));
     });
 }
@@ -72,25 +66,15 @@ pub fn hand_over(pwm: PwmInterrupt, control: ControlInterrupt, samples_per_ms: u
     });
 }
 
-fn set_priorities() {
-    // SAFETY: called once, inside a critical section, so nothing runs at the old priorities
-    // meanwhile.
-    unsafe {
-        let mut core = cortex_m::Peripherals::steal();
-        SCB::set_priority(&mut core.SCB, SystemHandler::SysTick, PWM_PRIORITY);
-        SCB::set_priority(&mut core.SCB, SystemHandler::PendSV, CONTROL_PRIORITY);
-    }
-}
-
-#[exception]
-fn SysTick() {
-    static mut INTERRUPT: Option<PwmInterrupt> = None;
+/// The PWM interrupt; `interrupt` is its own.
+#[inline]
+pub fn pwm(interrupt: &mut Option<PwmInterrupt>) {
     let start = Current::cost_counter();
-    if INTERRUPT.is_none() {
-        *INTERRUPT = critical_section::with(|cs| PWM_START.borrow(cs).take());
+    if interrupt.is_none() {
+        *interrupt = critical_section::with(|cs| PWM_START.borrow(cs).take());
     }
     jitter::record(clock::count_sample(), start);
-    match INTERRUPT {
+    match interrupt {
         Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),
         None => {}
@@ -98,13 +82,13 @@ fn SysTick() {
     counters::record_pwm_cost(start);
 }
 
-#[exception]
-fn PendSV() {
-    static mut INTERRUPT: Option<ControlInterrupt> = None;
-    if INTERRUPT.is_none() {
-        *INTERRUPT = critical_section::with(|cs| CONTROL_START.borrow(cs).take());
+/// The control interrupt; `interrupt` is its own.
+#[inline]
+pub fn control(interrupt: &mut Option<ControlInterrupt>) {
+    if interrupt.is_none() {
+        *interrupt = critical_section::with(|cs| CONTROL_START.borrow(cs).take());
     }
-    match INTERRUPT {
+    match interrupt {
         Some(ControlInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(ControlInterrupt::InLoop(interrupt)) => interrupt.run(),
         None => {}

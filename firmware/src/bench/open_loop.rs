@@ -1,9 +1,10 @@
 //! The ECU in open loop: it runs the vehicle model itself, and its telemetry is compared with the
 //! host's.
 
+use super::counters::{self, count_overrun};
+use super::recorder::{DutyRecording, RecordProducer};
+use super::run_state;
 use crate::board::{Board, Current};
-use crate::counters::{self, count_overrun};
-use crate::recorder::{DutyRecording, RecordProducer};
 use crate::tasks;
 use core::sync::atomic::{AtomicU32, Ordering};
 use embedded_hal::pwm::SetDutyCycle;
@@ -70,7 +71,7 @@ impl ControlInterrupt {
             pwm_cost: counters::take_pwm_cost(),
         });
         if self.index == self.steps {
-            tasks::finish();
+            run_state::finish();
         }
     }
 }

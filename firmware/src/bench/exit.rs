@@ -1,4 +1,8 @@
-//! Exit codes of a run, for the host.
+//! The end of a run: the PWM goes neutral first, then the host gets an exit code of its own.
+
+use super::recorder;
+use crate::board::{Board, Current};
+use crate::fault::Fault;
 
 /// Reason for the end of the firmware.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,13 +28,33 @@ pub enum ExitCode {
     LinkLost = 17,
 }
 
+impl From<Fault> for ExitCode {
+    fn from(fault: Fault) -> Self {
+        match fault {
+            Fault::Panic => Self::Panic,
+            Fault::HardFault => Self::HardFault,
+            Fault::Watchdog => Self::Watchdog,
+            Fault::UnexpectedInterrupt => Self::UnexpectedInterrupt,
+        }
+    }
+}
+
+/// The safe state, and the end of the run: PWM neutral, trailer written, exit code given.
+pub fn end_safely(code: ExitCode) -> ! {
+    cortex_m::interrupt::disable();
+    Current::neutralise_pwm();
+    // Nothing more can be done where the host does not take the trailer.
+    let _ = recorder::finish(code as u32);
+    exit(code)
+}
+
 /// SYS_EXIT_EXTENDED, the exit that takes a code along.
 const EXIT_EXTENDED: usize = 0x20;
 /// Its reason "the application has ended".
 const APPLICATION_EXIT: usize = 0x2_0026;
 
 /// Ends the emulation with the given code.
-pub fn exit(code: ExitCode) -> ! {
+fn exit(code: ExitCode) -> ! {
     let block = [APPLICATION_EXIT, code as usize];
     // SAFETY: the operation reads the two words of the block, which live until it returns.
     unsafe { cortex_m_semihosting::syscall1(EXIT_EXTENDED, block.as_ptr() as usize) };

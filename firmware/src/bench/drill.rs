@@ -1,40 +1,35 @@
-//! Fault drill: the ECU's fault handlers, triggered on purpose. The first setting, `fault=NAME`,
-//! selects one.
-//!
-//! `panic`, `hard-fault`, `stack-overflow`, `watchdog` (the main loop stops feeding it) and `hang`
-//! (interrupts and watchdog off, for the runner's time-out).
+//! Fault drill: the fault handlers, triggered on purpose.
 
-#![no_std]
-#![no_main]
-
-use core::panic::PanicInfo;
-use firmware::board::{Board, Current};
-use firmware::exit::ExitCode;
-use firmware::recorder::Recorder;
-use firmware::{command_line, fault, stack};
+use super::exit::ExitCode;
+use super::recorder::Recorder;
+use crate::board::{Board, Current};
 use shared_model::Scenario;
 use shared_model::open_loop::OpenLoop;
 use shared_model::telemetry::Header;
 
-#[cortex_m_rt::entry]
-fn main() -> ! {
-    stack::guard();
-    stack::paint();
+/// Provokes the fault of that name: `panic`, `hard-fault`, `stack-overflow`, `watchdog` (the main
+/// loop stops feeding it) or `hang` (interrupts and watchdog off, for the runner's time-out).
+/// Returns only if there is none of that name.
+pub fn run(name: &str) -> ExitCode {
     drive_pwm();
-    let text = command_line::text().unwrap_or("");
-    let setting = text.split_ascii_whitespace().nth(1);
-    match setting.and_then(|setting| setting.strip_prefix("fault=")) {
-        Some("panic") => panic!("drill"),
+    match name {
+        "panic" => panic!("drill"),
         // SAFETY: not safe, and meant not to be: nothing is mapped there, so the read faults.
-        Some("hard-fault") => unsafe {
+        "hard-fault" => unsafe {
             core::ptr::read_volatile(0xF000_0000 as *const u32);
         },
-        Some("stack-overflow") => {
+        "stack-overflow" => {
             overflow(0);
         }
-        Some("watchdog") => Current::start_watchdog(20),
-        Some("hang") => cortex_m::interrupt::disable(),
-        _ => fault::end_safely(ExitCode::BadScenario),
+        "watchdog" => Current::start_watchdog(20),
+        "hang" => cortex_m::interrupt::disable(),
+        _ => {
+            defmt::error!(
+                "scenario refused: fault={=str}: no fault of that name",
+                name
+            );
+            return ExitCode::BadScenario;
+        }
     }
     loop {
         core::hint::spin_loop();
@@ -67,13 +62,8 @@ fn drive_pwm() {
         initial: *ecu.control.state(),
     };
     let _ = Recorder::new(Some("drill.bin"), &header);
-    if let Ok(mut pwm) = Current::start_pwm(period) {
+    if let Ok((mut pwm, _)) = Current::start_pwm(period) {
         let _ = pwm.set_duty_cycle(period);
     }
     Current::stop_pwm_interrupt();
-}
-
-#[panic_handler]
-fn panic(_info: &PanicInfo<'_>) -> ! {
-    fault::end_safely(ExitCode::Panic)
 }

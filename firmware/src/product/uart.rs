@@ -1,0 +1,122 @@
+//! The UART's bytes: rings between its interrupt and the control task. Nothing here waits.
+
+use crate::board::{Board, Current};
+use core::cell::Cell;
+use cortex_m::interrupt::InterruptNumber;
+use cortex_m::peripheral::NVIC;
+use critical_section::Mutex;
+use heapless::spsc::{Consumer, Producer, Queue};
+use shared_model::bus::{Busy, SerialLine};
+
+/// Received bytes on their way: 2.5 ms of a full line of 1 Mbit/s.
+const RECEIVE_RING: usize = 256;
+/// Bytes to send: four packets.
+const SEND_RING: usize = 128;
+/// Bytes that one interrupt takes at most: more than a packet.
+const BYTES_PER_INTERRUPT: usize = 64;
+/// Above the PWM interrupt's: some UARTs hold one byte, and the PWM's duty may come later in its
+/// period.
+const PRIORITY: u8 = 0x00;
+
+/// The interrupt's ends of the rings.
+struct Ends {
+    received: Producer<'static, u8, RECEIVE_RING>,
+    to_send: Consumer<'static, u8, SEND_RING>,
+}
+
+static ENDS: Mutex<Cell<Option<Ends>>> = Mutex::new(Cell::new(None));
+
+/// The number of a board's interrupt.
+#[derive(Clone, Copy)]
+struct Number(u16);
+
+// SAFETY: boards give numbers that their chip has.
+unsafe impl InterruptNumber for Number {
+    fn number(self) -> u16 {
+        self.0
+    }
+}
+
+/// The control task's end of the line.
+pub struct Uart {
+    received: Consumer<'static, u8, RECEIVE_RING>,
+    to_send: Producer<'static, u8, SEND_RING>,
+}
+
+/// Opens the UART; `None` at the second call.
+pub fn open() -> Option<Uart> {
+    let receive = cortex_m::singleton!(: Queue<u8, RECEIVE_RING> = Queue::new())?;
+    let send = cortex_m::singleton!(: Queue<u8, SEND_RING> = Queue::new())?;
+    let (received, receiver) = receive.split();
+    let (sender, to_send) = send.split();
+    critical_section::with(|cs| ENDS.borrow(cs).set(Some(Ends { received, to_send })));
+    Current::open_uart();
+    for &number in Current::UART_INTERRUPTS {
+        // SAFETY: called once; the handler is `interrupt`, whose state is in its place.
+        unsafe {
+            let mut core = cortex_m::Peripherals::steal();
+            core.NVIC.set_priority(Number(number), PRIORITY);
+            NVIC::unmask(Number(number));
+        }
+    }
+    Some(Uart {
+        received: receiver,
+        to_send: sender,
+    })
+}
+
+/// The UART's interrupt, if `number` is one.
+pub fn interrupt(number: i16) -> bool {
+    let is_uart = u16::try_from(number).is_ok_and(|it| Current::UART_INTERRUPTS.contains(&it));
+    if is_uart {
+        // By taking them out and putting them back: nothing else has them meanwhile.
+        if let Some(mut ends) = critical_section::with(|cs| ENDS.borrow(cs).take()) {
+            ends.work();
+            critical_section::with(|cs| ENDS.borrow(cs).set(Some(ends)));
+        }
+    }
+    is_uart
+}
+
+impl Ends {
+    fn work(&mut self) {
+        Current::uart_acknowledge();
+        for _ in 0..BYTES_PER_INTERRUPT {
+            let Some(byte) = Current::uart_receive() else {
+                break;
+            };
+            // A byte without room is lost, and its packet with it.
+            let _ = self.received.enqueue(byte);
+        }
+        for _ in 0..SEND_RING {
+            let Some(&byte) = self.to_send.peek() else {
+                break;
+            };
+            if !Current::uart_send(byte) {
+                break;
+            }
+            self.to_send.dequeue();
+        }
+        Current::uart_interrupt_on_room(self.to_send.ready());
+    }
+}
+
+impl SerialLine for Uart {
+    fn receive(&mut self) -> Option<u8> {
+        self.received.dequeue()
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), Busy> {
+        if SEND_RING - 1 - self.to_send.len() < bytes.len() {
+            return Err(Busy);
+        }
+        for &byte in bytes {
+            // There is room, as seen above: only the interrupt changes it, and it makes more.
+            let _ = self.to_send.enqueue(byte);
+        }
+        if let Some(&number) = Current::UART_INTERRUPTS.first() {
+            NVIC::pend(Number(number));
+        }
+        Ok(())
+    }
+}
