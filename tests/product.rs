@@ -67,7 +67,7 @@ struct Loop {
 impl Loop {
     fn start(image: &Image) -> Self {
         Self {
-            ecu: OnBus::new(start(image)),
+            ecu: OnBus::new(start(image), ecu().periods_per_tick()),
             vehicle: VehicleNode::new(&scenario(), &manoeuvre()).expect("it is valid"),
         }
     }

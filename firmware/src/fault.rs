@@ -15,6 +15,8 @@ pub enum Fault {
     Watchdog = 3,
     /// An interrupt without a handler.
     UnexpectedInterrupt = 4,
+    /// The PWM or a task could not be started.
+    NotStarted = 5,
 }
 
 // SAFETY: each image defines the function, with this signature and without requirements.

@@ -15,10 +15,11 @@ const CONTROL_PRIORITY: u8 = 0xE0;
 
 static CONTROL_DUE: AtomicBool = AtomicBool::new(false);
 
-/// Gives the two interrupts their priorities. For use before either is enabled.
+/// Gives the two interrupts their priorities. For use after the board has taken its peripherals, and
+/// inside a critical section.
 pub fn set_priorities() {
-    // SAFETY: called once, before an interrupt is enabled or inside a critical section, so nothing
-    // runs at the old priorities meanwhile.
+    // SAFETY: called once, inside a critical section, so nothing runs at the old priorities
+    // meanwhile.
     unsafe {
         let mut core = cortex_m::Peripherals::steal();
         SCB::set_priority(&mut core.SCB, SystemHandler::SysTick, PWM_PRIORITY);

@@ -31,7 +31,7 @@ pub enum ExitCode {
 impl From<Fault> for ExitCode {
     fn from(fault: Fault) -> Self {
         match fault {
-            Fault::Panic => Self::Panic,
+            Fault::Panic | Fault::NotStarted => Self::Panic,
             Fault::HardFault => Self::HardFault,
             Fault::Watchdog => Self::Watchdog,
             Fault::UnexpectedInterrupt => Self::UnexpectedInterrupt,

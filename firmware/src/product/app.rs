@@ -5,6 +5,7 @@ use super::interrupts::{self, ControlInterrupt, PwmInterrupt};
 use super::uart::{self, Uart};
 use super::{configuration, history};
 use crate::board::{Board, Current};
+use crate::fault::{Fault, enter_safe_state};
 use crate::refusal::log_invalid_scenario;
 use crate::{stack, steering, tasks};
 use shared_model::Scenario;
@@ -87,15 +88,13 @@ fn steer(scenario: &Scenario<f32>, ecu: Ecu<f32>, uart: Uart, start: Start) -> !
     let samples_per_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
     let timeout_ms = (WATCHDOG_PERIODS * 1000.0 / rate_hz) as u32;
     let diagnosis_ticks = ((DIAGNOSIS_S * rate_hz) as u32).max(1);
-    critical_section::with(|_| {
+    let started = critical_section::with(|_| {
+        let (pin, bridge) = Current::start_pwm(period).ok()?;
         tasks::set_priorities();
-        let Ok((pin, bridge)) = Current::start_pwm(period) else {
-            return;
-        };
         let pwm = cortex_m::singleton!(: PwmInterrupt = PwmInterrupt {
             steering: steering::Pwm { task: ecu.pwm, pin, bridge },
             last_tick_counts: Current::cost_counter(),
-        });
+        })?;
         let control = cortex_m::singleton!(: ControlInterrupt = ControlInterrupt {
             steering: steering::Control { task: ecu.control },
             bus: SerialBus::new(uart),
@@ -103,12 +102,14 @@ fn steer(scenario: &Scenario<f32>, ecu: Ecu<f32>, uart: Uart, start: Start) -> !
             diagnosis: Diagnosis::new(start),
             diagnosis_ticks,
             ticks_to_diagnosis: 1,
-        });
-        if let (Some(pwm), Some(control)) = (pwm, control) {
-            interrupts::hand_over(pwm, control, samples_per_ms);
-        }
+        })?;
+        interrupts::hand_over(pwm, control, samples_per_ms);
         Current::start_watchdog(timeout_ms.max(WATCHDOG_LEAST_MS));
+        Some(())
     });
+    if started.is_none() {
+        enter_safe_state(Fault::NotStarted);
+    }
     let healthy_ticks = (HEALTHY_S * rate_hz) as u32;
     let mut ticks_seen = 0;
     let mut mode_seen = Mode::Starting;

@@ -52,10 +52,13 @@ pub fn open() -> Option<Uart> {
     critical_section::with(|cs| ENDS.borrow(cs).set(Some(Ends { received, to_send })));
     Current::open_uart();
     for &number in Current::UART_INTERRUPTS {
-        // SAFETY: called once; the handler is `interrupt`, whose state is in its place.
+        // SAFETY: called once; the handler is `interrupt`, whose state is in its place. Not by the
+        // crate's own way to the peripherals, which then are taken, and the board could not have
+        // them.
         unsafe {
-            let mut core = cortex_m::Peripherals::steal();
-            core.NVIC.set_priority(Number(number), PRIORITY);
+            if let Some(priority) = (*NVIC::PTR).ipr.get(usize::from(number)) {
+                priority.write(PRIORITY);
+            }
             NVIC::unmask(Number(number));
         }
     }

@@ -199,10 +199,12 @@ impl Board for Mps2 {
     }
 
     fn open_uart() {
-        // SAFETY: writes to registers of the UART, which nothing else uses.
+        // SAFETY: accesses to registers of the UART, which nothing else uses.
         unsafe {
             write_volatile(UART1_BAUDDIV, UART_DIVIDER);
             write_volatile(UART1_CTRL, UART_ON);
+            // A byte from before the start: the emulator passes no other on until it is taken.
+            read_volatile(UART1_DATA);
         }
     }
 

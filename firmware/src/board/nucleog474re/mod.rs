@@ -21,6 +21,10 @@ const CLOCK_HZ: u32 = 16_000_000;
 /// 1 Mbit/s.
 const UART_DIVIDER: u32 = CLOCK_HZ / 1_000_000;
 
+/// Flags of the UART: noise; overrun, noise and framing.
+const NOISE_ERROR: u32 = 1 << 2;
+const LINE_ERRORS: u32 = 0b1110;
+
 /// The board.
 pub struct NucleoG474re;
 
@@ -142,10 +146,11 @@ impl Board for NucleoG474re {
         // SAFETY: nothing else uses the UART; reading the data takes the byte out.
         let uart = unsafe { &*pac::USART1::ptr() };
         let state = uart.isr().read();
-        let has_error = state.ore().bit() || state.fe().bit() || state.ne().bit();
+        let has_noise = state.bits() & NOISE_ERROR != 0;
+        let has_error = state.ore().bit() || state.fe().bit() || has_noise;
         if has_error {
-            let clear = uart.icr();
-            clear.write(|w| w.orecf().set_bit().fecf().set_bit().ncf().set_bit());
+            // SAFETY: flags of the line's errors, each of which the register takes.
+            uart.icr().write(|w| unsafe { w.bits(LINE_ERRORS) });
         }
         let byte = state.rxne().bit().then(|| uart.rdr().read().bits() as u8);
         byte.filter(|_| !has_error)

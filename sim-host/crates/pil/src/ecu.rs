@@ -205,18 +205,24 @@ impl Ecu for Processor {
 /// the bus once per control tick. The duty codes are read from the emulated PWM.
 pub struct OnBus {
     session: BusSession,
-    /// Duty codes of the tick, not yet passed on.
+    /// Duty codes that are not yet passed on: those of the tick, and perhaps of the next, because
+    /// the PWM interrupt preempts the control task.
     duties: VecDeque<u16>,
+    periods_per_tick: u32,
+    /// PWM periods of the tick that are not yet passed on.
+    periods: u32,
     /// The frame of the tick, due with its last duty.
     frame: Option<FrameBytes>,
 }
 
 impl OnBus {
-    /// The firmware of a new session.
-    pub fn new(session: BusSession) -> Self {
+    /// The firmware of a new session, with that many PWM periods per control tick.
+    pub fn new(session: BusSession, periods_per_tick: u32) -> Self {
         Self {
             session,
             duties: VecDeque::new(),
+            periods_per_tick,
+            periods: 0,
             frame: None,
         }
     }
@@ -237,14 +243,16 @@ impl OnBus {
 
 impl Ecu for OnBus {
     fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
-        if self.duties.is_empty() {
+        if self.periods == 0 {
             let tick = self.session.tick()?;
-            self.duties = tick.duties.into();
+            self.duties.extend(tick.duties);
             self.frame = tick.frames.last().copied();
+            self.periods = self.periods_per_tick;
         }
-        // The ECU stops with a tick, and a tick has at least one period.
+        // A tick has all its periods; after a reset the first has fewer.
         let duty_code = self.duties.pop_front().unwrap_or_default();
-        let is_last = self.duties.is_empty();
+        self.periods -= 1;
+        let is_last = self.periods == 0;
         let reply = answer(&Packet {
             duty_code,
             frame: self.frame.take_if(|_| is_last),

@@ -194,7 +194,7 @@ fn on_bus(
         name: "configuration section",
     })?;
     let session = BusSession::start(&image, target.machine, target.time_out)?;
-    let mut processor = OnBus::new(session);
+    let mut processor = OnBus::new(session, ecu.periods_per_tick());
     let start = Instant::now();
     let run = run(&mut processor, vehicle, on_period)?;
     let elapsed = start.elapsed();

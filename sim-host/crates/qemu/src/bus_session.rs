@@ -24,8 +24,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// The function at which the core stops.
-const STOP_AT: &str = "receive_sensor_frame";
+/// The instruction at which the core stops; it does nothing.
+const STOP_AT: &str = "before_sensor_frame";
 /// Registers of virtual PWM and bridge: periods (4 bytes), duty, period, bridge (2 each), and the
 /// duties of the last periods (2 each).
 const REGISTERS: &str = "VIRTUAL_PWM";
@@ -212,7 +212,7 @@ impl BusSession {
                     last_line: self.log.last(),
                 });
             }
-            std::hint::spin_loop();
+            std::thread::yield_now();
         }
         Ok(())
     }
