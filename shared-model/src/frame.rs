@@ -15,6 +15,7 @@
 //! link's.
 
 use crate::e2e::Sender;
+use crate::e2e_state_machine::Config;
 use crate::exchange::FrameBytes;
 use crate::signal::{Actuation, Measurement, Mode};
 use core::fmt;
@@ -30,6 +31,27 @@ pub const ACTUATOR_DATA_ID: u16 = 0x5A02;
 /// its counter being arbitrary, passes with a chance of 3 in 256, so this is not larger than
 /// needed.
 pub const MAX_DELTA_COUNTER: u8 = 3;
+
+/// Window and thresholds of the ECU's state machine for sensor frames.
+///
+/// * *Loss*: more than 13 of the last 24 frames missing is invalid. Two of three lost for good reach
+///   that in 20 ticks. Two lost in a row, or every second one, do not. A random loss of 10 % does in
+///   one window of 1.5e8. Ten in a row are the age of the last frame, and found by it.
+/// * *Errors* (damaged or stale frames): more than 7 of 24. A damaged frame passes the checksum with a
+///   probability of 2^-16, so a link that damages more is not to be relied upon. Of replayed frames one
+///   in 16 has a fresh echo by chance, so that 8 errors come within 8 to 10 ticks.
+/// * *Start*: 11 good frames, so that the threshold of the valid state holds from its first tick on.
+/// * *Back from invalid*, before the ECU is active: almost a whole window of good frames. An active
+///   ECU does not come back: its safe state is latched.
+pub const SENSOR_STATE_MACHINE: Config = Config {
+    window_size: 24,
+    min_ok_init: 11,
+    max_error_init: 7,
+    min_ok_valid: 11,
+    max_error_valid: 7,
+    min_ok_invalid: 20,
+    max_error_invalid: 2,
+};
 
 /// A frame as words of four bytes, on whose borders its numbers lie.
 type Words = [[u8; 4]; 6];

@@ -11,6 +11,7 @@ pub mod controller;
 pub mod diagnostic;
 pub mod dither;
 pub mod e2e;
+pub mod e2e_state_machine;
 pub mod ecu;
 pub mod ecu_schedule;
 pub mod exchange;
