@@ -16,6 +16,7 @@ pub mod ecu;
 pub mod ecu_schedule;
 pub mod exchange;
 pub mod frame;
+pub mod freshness;
 pub mod friction;
 pub mod gate;
 pub mod integrate;
