@@ -74,6 +74,8 @@ pub enum Reaction {
     Restart,
     /// The firmware ended, its PWM neutral.
     Ended,
+    /// The ECU stopped sending: the vehicle has no further frames from it.
+    LinkLost,
 }
 
 impl Reaction {
@@ -85,6 +87,7 @@ impl Reaction {
             Self::SafeState => "safe state",
             Self::Restart => "restart",
             Self::Ended => "ended, neutral",
+            Self::LinkLost => "link lost",
         }
     }
 }
@@ -93,7 +96,8 @@ impl Reaction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Detected: the servo was brought to neutral, or the ECU restarted.
+    /// Detected: the servo was brought to neutral, the ECU restarted, or the vehicle lost the link
+    /// to it.
     Detected,
     /// Detected, and the ECU continued.
     Tolerated,
@@ -220,19 +224,24 @@ impl Judge {
         self.detect(Detector::Firmware(exit_code), tick, Reaction::Ended);
     }
 
-    /// The ECU stopped sending: the vehicle misses its frames, and the servo keeps its last duty.
-    pub fn timed_out(&mut self) {
+    /// The ECU stopped sending, between two packets or within one: the servo keeps its last duty,
+    /// and the vehicle misses the frame of the next control tick and all later ones.
+    pub fn timed_out(&mut self, vehicle: &VehicleNode) {
+        let tick = vehicle.periods() / self.periods_per_tick + 1;
+        self.reaction = Reaction::None;
         self.detect(
             Detector::Vehicle(Status::NoNewData),
-            self.injected_tick + 1,
-            Reaction::Tolerated,
+            tick,
+            Reaction::LinkLost,
         );
     }
 
     /// The outcome; `is_value_corrupted` if a corrupted value is still in use.
     pub fn outcome(&self, is_value_corrupted: bool) -> Outcome {
         let verdict = match self.reaction {
-            Reaction::SafeState | Reaction::Restart | Reaction::Ended => Verdict::Detected,
+            Reaction::SafeState | Reaction::Restart | Reaction::Ended | Reaction::LinkLost => {
+                Verdict::Detected
+            }
             Reaction::Tolerated => Verdict::Tolerated,
             Reaction::None if self.differs || is_value_corrupted => Verdict::Undetected,
             Reaction::None => Verdict::NoEffect,
