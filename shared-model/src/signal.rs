@@ -19,6 +19,15 @@ pub struct Measurement<T> {
 }
 
 impl<T: Real> Measurement<T> {
+    /// No signal is infinite or NaN.
+    pub fn is_finite(&self) -> bool {
+        self.wheel_speed_rpm.is_finite()
+            && self.yaw_rate_rad_per_s.is_finite()
+            && self.steering_angle_rad.is_finite()
+            && self.steering_rate_rad_per_s.is_finite()
+            && self.current_request_a.is_finite()
+    }
+
     /// The same measurement in another arithmetic.
     pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Measurement<U> {
         Measurement {

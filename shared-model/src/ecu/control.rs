@@ -84,7 +84,9 @@ impl<T: Real> Channel<T> {
         let new = input.frame.as_ref().filter(|_| status.is_ok());
         let new =
             new.map(|frame| decode_measurement(frame).map(&|signal| T::from_f64(signal.into())));
-        self.measurement = new.or(self.measurement);
+        // The gate finds a signal that is not a number. It must not enter the state: NaN is not equal
+        // to itself, so that the channels would differ for good.
+        self.measurement = new.filter(Measurement::is_finite).or(self.measurement);
         if new.is_some() {
             self.counter = self.receiver.counter();
         }

@@ -76,7 +76,7 @@ impl<T: Real> Model<T> {
 
     fn tick(&mut self, frame: Option<FrameBytes>) -> (Setpoint<T>, FrameBytes) {
         let new = frame.map(|frame| decode_measurement(&frame).map(&|x| T::from_f64(x.into())));
-        self.measurement = new.or(self.measurement);
+        self.measurement = new.filter(Measurement::is_finite).or(self.measurement);
         let none = Command {
             motor_v: T::zero(),
             dither_amplitude_v: T::zero(),
