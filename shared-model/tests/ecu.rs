@@ -419,8 +419,14 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
             "dither.sine_frequency_rad_per_s =",
         ),
         (
-            vec!["gate.dither_frequency_max_rad_per_s=15707"],
-            vec!["gate.dither_frequency_max_rad_per_s=15709"],
+            vec![
+                "run.pwm_rate_hz=5000",
+                "gate.dither_frequency_max_rad_per_s=7853",
+            ],
+            vec![
+                "run.pwm_rate_hz=5000",
+                "gate.dither_frequency_max_rad_per_s=7855",
+            ],
             "gate.dither_frequency_max_rad_per_s =",
         ),
         (
@@ -429,8 +435,8 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
             "from 5001 to",
         ),
         (
-            vec!["gate.safe_wheel_speed_rpm=2500"],
-            vec!["gate.safe_wheel_speed_rpm=2501"],
+            vec!["gate.wheel_speed_rpm=1200", "gate.safe_wheel_speed_rpm=1200"],
+            vec!["gate.wheel_speed_rpm=1200", "gate.safe_wheel_speed_rpm=1201"],
             "gate.safe_wheel_speed_rpm =",
         ),
         (
@@ -446,7 +452,8 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
     // Without dither its frequency is not checked.
     let none = [
         "dither.waveform=none",
-        "gate.dither_frequency_max_rad_per_s=1e6",
+        "gate.dither_frequency_max_rad_per_s=1e4",
+        "run.pwm_rate_hz=5000",
         "gate.square_amplitude_v=0",
     ];
     assert_eq!(refusal(&none), "");

@@ -2,6 +2,7 @@
 
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
+use shared_model::gate::Limits;
 use shared_model::parameter::ParameterSet;
 use shared_model::settings::{Choice, SettingError};
 use shared_model::short::Short;
@@ -96,6 +97,30 @@ fn ranges<T: Neighbours, P: ParameterSet<T>>(
         }
     }
     P::FIELDS.len()
+}
+
+/// A setting cannot widen a limit of the gate beyond about twice its default, or half of it where the
+/// limit is a least value.
+#[test]
+fn no_setting_widens_a_limit_of_the_gate_beyond_its_hard_bound() {
+    const LEAST: [&str; 3] = [
+        "square_least_amplitude_v",
+        "sine_least_amplitude_v",
+        "dither_frequency_min_rad_per_s",
+    ];
+    let mut limits = Scenario::<f64>::reconstruction().gate;
+    for field in Limits::<f64>::FIELDS {
+        let default = *(field.accessor)(&mut limits);
+        if LEAST.contains(&field.name) {
+            assert!(2.0 * field.min >= default, "{}", field.name);
+        } else {
+            assert!(field.max <= 2.0 * default, "{}", field.name);
+        }
+        let mut scenario = Scenario::<f64>::reconstruction();
+        let setting = format!("gate.{}=1e5", field.name);
+        assert_eq!(scenario.apply(&setting), Ok(()));
+        assert!(scenario.validate().is_err(), "{setting}");
+    }
 }
 
 /// Every number can be set by its name, and setting it changes no other.
