@@ -32,6 +32,8 @@ pub struct Begun {
     pub control_due: bool,
     /// The actuator frame of the last control tick, where a control tick is due.
     pub frame: Option<FrameBytes>,
+    /// The servo's bridge is on in the period.
+    pub bridge_on: bool,
 }
 
 impl Pwm {
@@ -54,6 +56,7 @@ impl Pwm {
         Begun {
             control_due: period.control_due,
             frame: output.map(|output| output.frame),
+            bridge_on: period.bridge_on,
         }
     }
 
@@ -63,6 +66,7 @@ impl Pwm {
             frame,
             elapsed_counts,
             found_by_pwm: self.task.faults(),
+            bridge_on: self.task.bridge_on(),
         };
         critical_section::with(|cs| INPUT.borrow(cs).set(input));
         if !tasks::call_control() {

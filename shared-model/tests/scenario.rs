@@ -31,7 +31,7 @@ macro_rules! each_section {
 
 /// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and
 /// run. The sections' lists and the map of a scenario are both held to it.
-const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 5 + 24 + 8;
+const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 5 + 29 + 8;
 
 /// The floats next to a bound.
 trait Neighbours: Real + FromStr {

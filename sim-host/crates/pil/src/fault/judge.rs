@@ -3,19 +3,11 @@
 use crate::vehicle_node::VehicleNode;
 use serde::Serialize;
 use shared_model::e2e::Status;
+use shared_model::ecu::Warning;
 use shared_model::exchange::Packet;
 use shared_model::frame::decode_actuation;
 use shared_model::gate::Faults;
 use shared_model::signal::{Actuation, Mode};
-
-/// Names of the warnings in an actuator frame, by bit.
-const WARNINGS: [&str; 5] = [
-    "frame missing",
-    "frame damaged",
-    "frame repeated",
-    "frame sequence",
-    "frames lost",
-];
 
 /// The part of the loop that detected a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,9 +31,9 @@ impl Detector {
                 names.join(" + ")
             }
             Self::Warning(bits) => {
-                let set = WARNINGS.iter().enumerate();
-                let set = set.filter(|(bit, _)| bits & (1 << bit) != 0);
-                let names: Vec<_> = set.map(|(_, name)| *name).collect();
+                let set = Warning::ALL.into_iter();
+                let set = set.filter(|warning| bits & warning.bit() != 0);
+                let names: Vec<_> = set.map(Warning::name).collect();
                 format!("warning: {}", names.join(" + "))
             }
             Self::Vehicle(status) => format!("vehicle: {status:?}"),
@@ -175,7 +167,8 @@ impl Judge {
     /// Observes a completed PWM period: the ECU's packet, its packet in the fault-free run, and the
     /// vehicle.
     pub fn observe(&mut self, from_ecu: &Packet, fault_free: &Packet, vehicle: &VehicleNode) {
-        self.differs |= from_ecu.duty_code != fault_free.duty_code;
+        self.differs |= (from_ecu.duty_code, from_ecu.bridge_on)
+            != (fault_free.duty_code, fault_free.bridge_on);
         let (now, expected) = (actuation(from_ecu), actuation(fault_free));
         self.differs |= commands(now.as_ref()) != commands(expected.as_ref());
         let tick = vehicle.periods() / self.periods_per_tick;
@@ -259,13 +252,14 @@ fn actuation(packet: &Packet) -> Option<Actuation<f32>> {
     decode_actuation(packet.frame.as_ref()?).ok()
 }
 
-fn commands(actuation: Option<&Actuation<f32>>) -> Option<(Mode, u32, u32, u32)> {
+fn commands(actuation: Option<&Actuation<f32>>) -> Option<(Mode, u32, u32, u32, bool)> {
     actuation.map(|actuation| {
         (
             actuation.mode,
             actuation.motor_voltage_v.to_bits(),
             actuation.dither_amplitude_v.to_bits(),
             actuation.wheel_speed_limit_rpm.to_bits(),
+            actuation.bridge_on,
         )
     })
 }
