@@ -9,7 +9,8 @@ use shared_model::e2e::{Receiver, Sender, Status};
 use shared_model::ecu::Warning;
 use shared_model::exchange::{FRAME_LEN, FrameBytes};
 use shared_model::frame::{
-    ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, encode_actuation, encode_measurement,
+    ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, SENSOR_STATE_MACHINE, encode_actuation,
+    encode_measurement,
 };
 use shared_model::gate::Fault;
 use shared_model::signal::{Actuation, Measurement, Mode};
@@ -125,6 +126,8 @@ fn actuation(rng: &mut Rng) -> Actuation<f32> {
         wheel_speed_limit_rpm: number(rng),
         warnings: rng.u16(..),
         sensor_counter: rng.u8(..),
+        bridge_on: rng.bool(),
+        challenge: rng.u8(..),
     }
 }
 
@@ -157,8 +160,9 @@ impl Value {
 
 type Signals = Vec<(&'static str, Value)>;
 
-fn sensor_signals(m: &Measurement<f32>) -> Signals {
+fn sensor_signals(m: &Measurement<f32>, challenge_echo: u8) -> Signals {
     vec![
+        ("challenge_echo", Value::text(challenge_echo)),
         ("wheel_speed_rpm", Value::Number(m.wheel_speed_rpm)),
         ("yaw_rate_rad_per_s", Value::Number(m.yaw_rate_rad_per_s)),
         ("steering_angle_rad", Value::Number(m.steering_angle_rad)),
@@ -173,6 +177,10 @@ fn sensor_signals(m: &Measurement<f32>) -> Signals {
 fn actuator_signals(a: &Actuation<f32>) -> Signals {
     vec![
         ("mode", Value::text(format!("{:?}", a.mode))),
+        (
+            "bridge_on",
+            Value::text(if a.bridge_on { "On" } else { "Off" }),
+        ),
         ("faults", Value::text(a.faults)),
         ("motor_voltage_v", Value::Number(a.motor_voltage_v)),
         ("dither_amplitude_v", Value::Number(a.dither_amplitude_v)),
@@ -182,6 +190,7 @@ fn actuator_signals(a: &Actuation<f32>) -> Signals {
         ),
         ("warnings", Value::text(a.warnings)),
         ("sensor_counter", Value::text(a.sensor_counter)),
+        ("challenge", Value::text(a.challenge)),
     ]
 }
 
@@ -190,12 +199,12 @@ fn frames() -> Vec<(Kind, FrameBytes, Signals)> {
     let mut rng = Rng::with_seed(4);
     let mut sender = Sender::new(SENSOR_DATA_ID);
     let sensors: Vec<_> = (0..FRAMES)
-        .map(|_| measurement(&mut rng))
-        .map(|m| {
+        .map(|_| (measurement(&mut rng), rng.u8(..)))
+        .map(|(m, challenge_echo)| {
             (
                 SENSOR,
-                encode_measurement(&m, &mut sender),
-                sensor_signals(&m),
+                encode_measurement(&m, challenge_echo, &mut sender),
+                sensor_signals(&m, challenge_echo),
             )
         })
         .collect();
@@ -280,6 +289,21 @@ fn damaged_and_foreign_frames_are_bad_for_both() {
     );
 }
 
+/// Window and thresholds of the ECU's state machine, as the script lists them.
+fn state_machine() -> String {
+    let c = SENSOR_STATE_MACHINE;
+    let numbers = [
+        c.window_size,
+        c.min_ok_init,
+        c.max_error_init,
+        c.min_ok_valid,
+        c.max_error_valid,
+        c.min_ok_invalid,
+        c.max_error_invalid,
+    ];
+    numbers.map(|number| number.to_string()).join(",")
+}
+
 #[test]
 fn dbc_file_has_the_constants() {
     let kinds = [SENSOR, ACTUATOR];
@@ -288,7 +312,13 @@ fn dbc_file_has_the_constants() {
         .zip(query(&kinds.map(|(name, _)| name.to_owned())))
     {
         let expected = format!(
-            "can_fd=True length={FRAME_LEN} profile=PROFILE_05 data_id={data_id} max_delta_counter={MAX_DELTA_COUNTER}"
+            "can_fd=True length={FRAME_LEN} profile=PROFILE_05 data_id={data_id} max_delta_counter={MAX_DELTA_COUNTER} \
+             state_machine={}",
+            if *data_id == SENSOR_DATA_ID {
+                state_machine()
+            } else {
+                "none".into()
+            }
         );
         assert_eq!(answer.join(" "), expected);
     }
@@ -301,7 +331,11 @@ fn statuses_are_those_of_another_crate() {
     let mut frames = Vec::new();
     let mut sender = Sender::new(SENSOR_DATA_ID);
     for _ in 0..20_000 {
-        frames.push(encode_measurement(&measurement(&mut rng), &mut sender));
+        frames.push(encode_measurement(
+            &measurement(&mut rng),
+            rng.u8(..),
+            &mut sender,
+        ));
     }
     let foreign = encode_actuation(&actuation(&mut rng), &mut Sender::new(ACTUATOR_DATA_ID));
     let mut receiver = Receiver::new(SENSOR_DATA_ID, MAX_DELTA_COUNTER);

@@ -359,7 +359,10 @@ fn a_brown_out_loop_leaves_the_servo_neutral_at_each_start_and_a_working_ecu_aft
         let first: Tick = run.ecu.session().tick().expect("it starts");
         let neutral = run.servo().neutral;
         assert!(
-            first.duties.iter().all(|&duty| duty == neutral),
+            first
+                .periods
+                .iter()
+                .all(|period| period.duty_code == neutral),
             "{first:?}"
         );
     }

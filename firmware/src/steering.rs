@@ -6,6 +6,7 @@ use crate::tasks;
 use core::cell::Cell;
 use core::sync::atomic::{AtomicU32, Ordering};
 use critical_section::Mutex;
+use embedded_hal::digital::OutputPin;
 use embedded_hal::pwm::SetDutyCycle;
 use shared_model::ecu::{ControlInput, ControlOutput, ControlTask, PwmTask};
 use shared_model::exchange::FrameBytes;
@@ -32,6 +33,8 @@ pub struct Begun {
     pub control_due: bool,
     /// The actuator frame of the last control tick, where a control tick is due.
     pub frame: Option<FrameBytes>,
+    /// The servo's bridge is on in the period.
+    pub bridge_on: bool,
 }
 
 impl Pwm {
@@ -39,6 +42,12 @@ impl Pwm {
     /// result of the last one.
     pub fn begin(&mut self) -> Begun {
         let period = self.task.begin();
+        // The second way to switch off: it acts at once, and not with the next period.
+        let _ = if period.bridge_on {
+            self.bridge.set_high()
+        } else {
+            self.bridge.set_low()
+        };
         // The PWM's period is the duty's, so the code fits; one that is refused is found on the
         // pin.
         let _ = self.pin.set_duty_cycle(period.duty.code());
@@ -54,6 +63,7 @@ impl Pwm {
         Begun {
             control_due: period.control_due,
             frame: output.map(|output| output.frame),
+            bridge_on: period.bridge_on,
         }
     }
 
@@ -63,6 +73,7 @@ impl Pwm {
             frame,
             elapsed_counts,
             found_by_pwm: self.task.faults(),
+            bridge_on: self.task.bridge_on(),
         };
         critical_section::with(|cs| INPUT.borrow(cs).set(input));
         if !tasks::call_control() {

@@ -105,6 +105,6 @@ fn frame_seeds() -> Vec<Vec<u8>> {
         current_request_a: 0.0,
     };
     let mut senders = [0, 1].map(|k| Sender::new(data_id(k)));
-    let mut one = |k: usize| encode_measurement(&measurement, &mut senders[k % 2]);
+    let mut one = |k: usize| encode_measurement(&measurement, k as u8, &mut senders[k % 2]);
     vec![(0..8).flat_map(&mut one).collect()]
 }

@@ -98,6 +98,7 @@ fn read_manoeuvre(bytes: &[u8]) {
                 assert!(vehicle.total_periods() > 0);
                 vehicle.answer(&shared_model::exchange::Packet {
                     duty_code: 0,
+                    bridge_on: true,
                     frame: None,
                 });
             }

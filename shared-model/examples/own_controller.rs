@@ -29,6 +29,7 @@ fn main() {
         let setpoint = gate.run(&Observation {
             elapsed_counts: tick_counts,
             measurement: Some(measurement),
+            measurement_age_ticks: 1,
             motor_v,
             dither_amplitude_v: 0.0,
             found_outside: Faults::NONE,

@@ -70,6 +70,13 @@ impl<T: Real> Controller<T> {
         }
     }
 
+    /// The controller with another schedule.
+    #[cfg(test)]
+    pub(crate) fn with_schedule(mut self, schedule: Table<T>) -> Self {
+        self.schedule = schedule;
+        self
+    }
+
     fn switch_dither(&mut self, speed_rpm: T) {
         if self.ticks_to_dither > 0 {
             self.ticks_to_dither -= 1;

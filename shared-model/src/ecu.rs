@@ -6,8 +6,8 @@
 //! interrupts cannot change a result.
 //!
 //! Both tasks run twice, on two sets of parameters and state in memory (`dual_channel`). A mismatch
-//! indicates memory corruption and latches the safe state; until that acts, the duty closer to
-//! neutral is put out. The actuator frame is the first channel's, with the lower of both wheel
+//! indicates memory corruption, latches the safe state and switches the servo's bridge off; until
+//! that acts, the duty closer to neutral is put out. The actuator frame is the first channel's, with the lower of both wheel
 //! speed limits. [`Ecu`] runs the tasks in turn on the host; firmware runs them at two priorities.
 //! Both give the same bits.
 
@@ -15,9 +15,12 @@ mod consistency;
 mod control;
 mod dual_channel;
 mod pwm;
+mod reception;
+mod warning;
 
-pub use control::{ControlInput, ControlOutput, ControlTask, Warning};
+pub use control::{ControlInput, ControlOutput, ControlTask};
 pub use pwm::{PwmPeriod, PwmTask};
+pub use warning::Warning;
 
 use crate::exchange::{FrameBytes, Packet};
 use crate::{InvalidScenario, Real, Scenario};
@@ -66,6 +69,7 @@ impl<T: Real> Ecu<T> {
         }
         let reply = exchange(&Packet {
             duty_code: period.duty.code(),
+            bridge_on: period.bridge_on,
             frame,
         });
         self.pwm.end(reply.duty_code);
@@ -77,6 +81,7 @@ impl<T: Real> Ecu<T> {
             frame: self.frame.take(),
             elapsed_counts: elapsed_counts(),
             found_by_pwm: self.pwm.faults(),
+            bridge_on: self.pwm.bridge_on(),
         };
         let output = self.control.run(&input);
         self.output = Some(output);

@@ -10,8 +10,9 @@
 pub const FRAME_LEN: usize = 24;
 /// Bytes of a sensor or actuator frame.
 pub type FrameBytes = [u8; FRAME_LEN];
-/// Length of either packet, bytes: duty code, "a frame follows", frame (zeros without one).
-pub const PACKET_LEN: usize = 2 + 1 + FRAME_LEN;
+/// Length of either packet, bytes: duty code, "the bridge is on", "a frame follows", frame (zeros
+/// without one).
+pub const PACKET_LEN: usize = 2 + 1 + 1 + FRAME_LEN;
 /// Bytes of a packet.
 pub type PacketBytes = [u8; PACKET_LEN];
 
@@ -26,6 +27,9 @@ pub struct Packet {
     /// From the ECU: the duty code of the period that begins. To the ECU: the code that was
     /// captured at the servo's pin during that period.
     pub duty_code: u16,
+    /// From the ECU: whether the servo's bridge is on in the period that begins; without it no
+    /// voltage is applied, whatever the duty. To the ECU: as it was in that period.
+    pub bridge_on: bool,
     /// From the ECU an actuator frame, to the ECU a sensor frame; `None` between control ticks, or
     /// if it was lost.
     pub frame: Option<FrameBytes>,
@@ -36,15 +40,16 @@ impl Packet {
     ///
     /// ```
     /// use shared_model::exchange::Packet;
-    /// let packet = Packet { duty_code: 1250, frame: Some([7; 24]) };
+    /// let packet = Packet { duty_code: 1250, bridge_on: true, frame: Some([7; 24]) };
     /// assert_eq!(Packet::decode(&packet.encode()), packet);
     /// ```
     pub fn encode(&self) -> PacketBytes {
         let mut bytes = [0; PACKET_LEN];
         bytes[..2].copy_from_slice(&self.duty_code.to_le_bytes());
+        bytes[2] = self.bridge_on.into();
         if let Some(frame) = &self.frame {
-            bytes[2] = 1;
-            bytes[3..].copy_from_slice(frame);
+            bytes[3] = 1;
+            bytes[4..].copy_from_slice(frame);
         }
         bytes
     }
@@ -52,10 +57,11 @@ impl Packet {
     /// Reads a packet's bytes.
     pub fn decode(bytes: &PacketBytes) -> Self {
         let mut frame = [0; FRAME_LEN];
-        frame.copy_from_slice(&bytes[3..]);
+        frame.copy_from_slice(&bytes[4..]);
         Self {
             duty_code: u16::from_le_bytes([bytes[0], bytes[1]]),
-            frame: (bytes[2] != 0).then_some(frame),
+            bridge_on: bytes[2] != 0,
+            frame: (bytes[3] != 0).then_some(frame),
         }
     }
 }
@@ -63,7 +69,7 @@ impl Packet {
 /// The ECU's message in a PWM period.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ToHost {
-    /// Duty and actuator frame.
+    /// Duty, bridge and actuator frame.
     pub packet: Packet,
     /// Most counts of the cost clock that the PWM task took in a period since the last control
     /// tick, without the exchange.

@@ -23,6 +23,28 @@ impl<T: Real, const POINTS: usize> Schedule<T, POINTS> {
         self.amplitudes_v.iter().fold(T::zero(), larger)
     }
 
+    /// Least amplitude at a wheel speed and above, V.
+    ///
+    /// ```
+    /// use shared_model::schedule::Schedule;
+    /// let schedule = Schedule { first_rpm: 1500.0_f32, step_rpm: 50.0, amplitudes_v: [0.0, 0.12, 0.1] };
+    /// assert_eq!(schedule.least_above_v(1499.0), 0.0);
+    /// assert_eq!(schedule.least_above_v(1510.0), 0.1);
+    /// ```
+    pub fn least_above_v(&self, wheel_speed_rpm: T) -> T {
+        let mut least_v = self.amplitude_v(wheel_speed_rpm);
+        let mut speed_rpm = self.first_rpm;
+        // Constant from each speed of the schedule to the next.
+        for _ in &self.amplitudes_v {
+            let amplitude_v = self.amplitude_v(speed_rpm);
+            if speed_rpm > wheel_speed_rpm && amplitude_v < least_v {
+                least_v = amplitude_v;
+            }
+            speed_rpm += self.step_rpm;
+        }
+        least_v
+    }
+
     /// Amplitude for a wheel speed, V; see [`amplitude_v`].
     ///
     /// ```

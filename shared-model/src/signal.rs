@@ -19,6 +19,15 @@ pub struct Measurement<T> {
 }
 
 impl<T: Real> Measurement<T> {
+    /// No signal is infinite or NaN.
+    pub fn is_finite(&self) -> bool {
+        self.wheel_speed_rpm.is_finite()
+            && self.yaw_rate_rad_per_s.is_finite()
+            && self.steering_angle_rad.is_finite()
+            && self.steering_rate_rad_per_s.is_finite()
+            && self.current_request_a.is_finite()
+    }
+
     /// The same measurement in another arithmetic.
     pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Measurement<U> {
         Measurement {
@@ -68,8 +77,12 @@ pub struct Actuation<T> {
     pub wheel_speed_limit_rpm: T,
     /// Events that were detected and tolerated since the last frame, one bit each.
     pub warnings: u16,
-    /// Counter of the last valid sensor frame.
+    /// Counter of the last sensor frame that was used; 255 before the first.
     pub sensor_counter: u8,
+    /// Whether the servo's bridge is on; see `ecu::PwmPeriod`.
+    pub bridge_on: bool,
+    /// Challenge that the vehicle returns in its sensor frames; see `freshness`.
+    pub challenge: u8,
 }
 
 impl<T: Real> Actuation<T> {
@@ -83,6 +96,8 @@ impl<T: Real> Actuation<T> {
             wheel_speed_limit_rpm: f(self.wheel_speed_limit_rpm),
             warnings: self.warnings,
             sensor_counter: self.sensor_counter,
+            bridge_on: self.bridge_on,
+            challenge: self.challenge,
         }
     }
 }

@@ -9,7 +9,7 @@ use shared_model::exchange::{FRAME_LEN, FrameBytes, Packet};
 use shared_model::frame::{
     ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_actuation, encode_measurement,
 };
-use shared_model::gate::{Fault, Faults};
+use shared_model::gate::{Fault, Faults, Setpoint};
 use shared_model::servo::{Duty, Pwm};
 use shared_model::signal::{Measurement, Mode};
 
@@ -19,6 +19,9 @@ const PERIODS_A_TICK: u32 = 10;
 const NEUTRAL: u16 = 1250;
 /// Ticks in which the safe state takes the greatest voltage away.
 const SLOWEST_RAMP_TICKS: u32 = 1126;
+/// Good ticks until the ECU is active: two in which its first challenge comes back, one that begins
+/// the communication, and eleven good frames.
+const START_TICKS: u32 = 14;
 
 fn scenario() -> Scenario<f32> {
     let mut scenario = Scenario::reconstruction();
@@ -42,8 +45,12 @@ fn measurement(current_request_a: f32) -> Measurement<f32> {
 struct Rig {
     ecu: Ecu<f32>,
     sender: Sender,
+    /// Challenge of the last actuator frame: each sensor frame returns it, one tick later.
+    challenge: u8,
     /// Duty codes of the last tick's periods.
     codes: Vec<u16>,
+    /// Whether the bridge was on in each of them.
+    bridges: Vec<bool>,
 }
 
 impl Rig {
@@ -51,8 +58,19 @@ impl Rig {
         Self {
             ecu: Ecu::new(scenario, CLOCK_HZ).unwrap(),
             sender: Sender::new(SENSOR_DATA_ID),
+            challenge: 0,
             codes: Vec::new(),
+            bridges: Vec::new(),
         }
+    }
+
+    /// Active for the first tick.
+    fn active(scenario: &Scenario<f32>) -> Self {
+        let mut rig = Self::new(scenario);
+        for _ in 0..START_TICKS {
+            rig.good_tick(0.0);
+        }
+        rig
     }
 
     /// Active at a settled request, dither fully on.
@@ -65,7 +83,11 @@ impl Rig {
     }
 
     fn frame(&mut self, current_request_a: f32) -> FrameBytes {
-        encode_measurement(&measurement(current_request_a), &mut self.sender)
+        self.frame_of(&measurement(current_request_a))
+    }
+
+    fn frame_of(&mut self, measurement: &Measurement<f32>) -> FrameBytes {
+        encode_measurement(measurement, self.challenge, &mut self.sender)
     }
 
     fn good_tick(&mut self, current_request_a: f32) -> ControlOutput<f32> {
@@ -80,18 +102,27 @@ impl Rig {
         pin: impl Fn(u16) -> u16,
     ) -> ControlOutput<f32> {
         self.codes.clear();
+        self.bridges.clear();
         loop {
-            let mut code = 0;
+            let (mut code, mut bridge_on) = (0, false);
+            let mut challenge = self.challenge;
             let is_last = self.codes.len() as u32 == PERIODS_A_TICK - 1;
             let answer = |packet: &Packet| {
                 code = packet.duty_code;
+                bridge_on = packet.bridge_on;
+                if let Some(frame) = &packet.frame {
+                    challenge = decode_actuation(frame).unwrap().challenge;
+                }
                 Packet {
                     duty_code: pin(code),
+                    bridge_on,
                     frame: frame.filter(|_| is_last),
                 }
             };
             let output = self.ecu.period(answer, || elapsed_counts);
+            self.challenge = challenge;
             self.codes.push(code);
+            self.bridges.push(bridge_on);
             if let Some(output) = output {
                 return output;
             }
@@ -107,7 +138,7 @@ fn assert_safe(output: &ControlOutput<f32>, fault: Fault) {
 }
 
 #[test]
-fn starts_with_the_first_frame_and_tells_it() {
+fn starts_with_enough_good_frames_and_reports_it() {
     let mut rig = Rig::new(&scenario());
     let mut receiver = Receiver::new(ACTUATOR_DATA_ID, MAX_DELTA_COUNTER);
     for _ in 0..3 {
@@ -119,11 +150,21 @@ fn starts_with_the_first_frame_and_tells_it() {
         assert_eq!(receiver.check(Some(&output.frame)), Status::Ok);
         assert_eq!(rig.codes, [NEUTRAL; 10]);
     }
-    for counter in 0..5 {
+    // The challenge has come back; the communication begins, and needs eleven good frames.
+    for _ in 0..11 {
+        let output = rig.good_tick(10.0);
+        assert_eq!(output.actuation.mode, Mode::Starting);
+        assert_eq!(output.actuation.warnings, 0);
+        assert_eq!(output.actuation.sensor_counter, 255, "no frame is used yet");
+        assert_eq!(receiver.check(Some(&output.frame)), Status::Ok);
+        assert_eq!(output.setpoints, [Setpoint::neutral(); 2]);
+    }
+    for counter in 11..16 {
         let output = rig.good_tick(10.0);
         assert_eq!(output.actuation.mode, Mode::Active);
         assert_eq!(output.actuation.warnings, 0);
         assert_eq!(output.actuation.faults, 0);
+        assert!(output.actuation.bridge_on);
         assert_eq!(output.actuation.sensor_counter, counter);
         assert_eq!(output.actuation.wheel_speed_limit_rpm, 2500.0);
         let setpoint = output.setpoints[0];
@@ -193,7 +234,7 @@ fn duty_is_motor_and_dither() {
 
 #[test]
 fn a_frame_counts_whenever_it_came_since_the_last_tick() {
-    let mut rig = Rig::new(&scenario());
+    let mut rig = Rig::active(&scenario());
     let frame = rig.frame(1.0);
     for period in 0..10 {
         let answer = |packet: &Packet| Packet {
@@ -202,6 +243,7 @@ fn a_frame_counts_whenever_it_came_since_the_last_tick() {
         };
         if let Some(output) = rig.ecu.period(answer, || TICK_COUNTS) {
             assert_eq!(output.actuation.mode, Mode::Active);
+            assert_eq!(output.actuation.warnings, 0);
         }
     }
     // And only once.
@@ -231,7 +273,7 @@ fn what_is_wrong_with_a_frame_is_a_warning() {
     let mut again = rig.sender;
     let frame = rig.frame(10.0);
     assert_eq!(warnings(rig.tick(Some(frame), TICK_COUNTS, |code| code)), 0);
-    let frame = encode_measurement(&measurement(10.0), &mut again);
+    let frame = encode_measurement(&measurement(10.0), rig.challenge, &mut again);
     let repeated = rig.tick(Some(frame), TICK_COUNTS, |code| code);
     assert_eq!(warnings(repeated), 4);
 
@@ -271,7 +313,8 @@ fn every_flipped_bit_of_a_sensor_frame_is_found() {
 #[test]
 fn without_frames_the_safe_state_follows() {
     let mut rig = Rig::settled(10.0);
-    for _ in 0..10 {
+    // The last frame was two ticks old when it came.
+    for _ in 0..8 {
         let output = rig.tick(None, TICK_COUNTS, |code| code);
         assert_eq!(output.actuation.mode, Mode::Active);
     }
@@ -281,8 +324,11 @@ fn without_frames_the_safe_state_follows() {
         rig.good_tick(10.0);
     }
     for _ in 0..100 {
-        assert_safe(&rig.good_tick(10.0), Fault::FrameAge);
+        let output = rig.good_tick(10.0);
+        assert_safe(&output, Fault::FrameAge);
         assert_eq!(rig.codes, [NEUTRAL; 10], "until restart");
+        assert_eq!(rig.bridges, [true; 10]);
+        assert!(output.actuation.bridge_on);
     }
 }
 
@@ -304,6 +350,119 @@ fn a_stuck_pin_is_found() {
         let output = rig.tick(Some(frame), TICK_COUNTS, |_| stuck);
         assert_safe(&output, Fault::Readback);
     }
+}
+
+/// From the period on that follows the second wrong one; the frame reports it.
+#[test]
+fn a_stuck_pin_switches_the_bridge_off() {
+    for stuck in [0, NEUTRAL, 2500] {
+        let mut rig = Rig::settled(10.0);
+        let frame = rig.frame(10.0);
+        let output = rig.tick(Some(frame), TICK_COUNTS, |_| stuck);
+        assert_eq!(rig.bridges[..2], [true; 2], "one is a capture on an edge");
+        assert_eq!(rig.bridges[2..], [false; 8]);
+        assert!(!output.actuation.bridge_on);
+        assert!(!decode_actuation(&output.frame).unwrap().bridge_on);
+        for _ in 0..2000 {
+            let output = rig.good_tick(10.0);
+            assert_eq!(rig.bridges, [false; 10], "until restart");
+            assert!(!output.actuation.bridge_on);
+        }
+    }
+}
+
+/// A safe state of another cause, and then the pin is stuck, or a setpoint is corrupted.
+#[test]
+fn the_safe_state_judges_pin_and_channels() {
+    let safe = || {
+        let mut rig = Rig::settled(10.0);
+        let frame = rig.frame(10.0);
+        let output = rig.tick(Some(frame), 0, |code| code);
+        assert_safe(&output, Fault::TickWindow);
+        for _ in 0..50 {
+            rig.good_tick(10.0);
+            assert_eq!(rig.bridges, [true; 10]);
+        }
+        rig
+    };
+    let mut rig = safe();
+    let frame = rig.frame(10.0);
+    let output = rig.tick(Some(frame), TICK_COUNTS, |_| 2000);
+    assert_eq!(rig.bridges[2..], [false; 8]);
+    assert!(!output.actuation.bridge_on);
+    assert_safe(&output, Fault::TickWindow);
+
+    let mut rig = safe();
+    let mut output = rig.good_tick(10.0);
+    output.setpoints[1].motor_v += 0.5;
+    rig.ecu.pwm.accept(&output);
+    rig.good_tick(10.0);
+    assert_eq!(rig.bridges, [false; 10], "from this period on");
+    let output = rig.good_tick(10.0);
+    assert!(!output.actuation.bridge_on);
+    assert_safe(&output, Fault::TickWindow);
+}
+
+/// A signal that is not a number is a fault of the sensor, in both channels the same: it is not taken
+/// for a corrupted memory, and the servo keeps its ramp.
+#[test]
+fn a_signal_that_is_not_a_number_leaves_the_channels_equal() {
+    let signals: [fn(&mut Measurement<f32>) -> &mut f32; 5] = [
+        |m| &mut m.wheel_speed_rpm,
+        |m| &mut m.yaw_rate_rad_per_s,
+        |m| &mut m.steering_angle_rad,
+        |m| &mut m.steering_rate_rad_per_s,
+        |m| &mut m.current_request_a,
+    ];
+    for signal in signals {
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut rig = Rig::settled(10.0);
+            let mut measurement = measurement(10.0);
+            *signal(&mut measurement) = bad;
+            let frame = rig.frame_of(&measurement);
+            let output = rig.tick(Some(frame), TICK_COUNTS, |code| code);
+            assert_safe(&output, Fault::SensorNotANumber);
+            for _ in 0..1500 {
+                let output = rig.good_tick(10.0);
+                assert_safe(&output, Fault::SensorNotANumber);
+                assert!(output.actuation.bridge_on);
+                assert_eq!(rig.bridges, [true; 10]);
+            }
+            assert_eq!(rig.codes, [NEUTRAL; 10]);
+        }
+    }
+}
+
+/// Both channels of either task must agree to the bridge.
+#[test]
+fn one_channel_switches_the_bridge_off() {
+    for bridge_on in [[false, true], [true, false], [false, false]] {
+        let mut rig = Rig::settled(10.0);
+        let output = rig.good_tick(10.0);
+        rig.ecu.pwm.accept(&ControlOutput {
+            bridge_on,
+            ..output
+        });
+        assert!(!rig.ecu.pwm.bridge_on());
+        rig.good_tick(10.0);
+        assert_eq!(rig.bridges, [false; 10]);
+    }
+    // The control task reports it, and its next outputs keep it off.
+    let mut rig = Rig::settled(10.0);
+    let input = ControlInput {
+        bridge_on: false,
+        ..ControlInput::NOTHING
+    };
+    assert!(!rig.ecu.control.run(&input).actuation.bridge_on);
+    let input = ControlInput {
+        found_by_pwm: Fault::ChannelsDiffer.into(),
+        ..ControlInput::NOTHING
+    };
+    let output = rig.ecu.control.run(&input);
+    assert_eq!(output.bridge_on, [false; 2]);
+    let output = rig.ecu.control.run(&ControlInput::NOTHING);
+    assert_eq!(output.bridge_on, [false; 2]);
+    assert!(!output.actuation.bridge_on);
 }
 
 #[test]
@@ -358,6 +517,278 @@ fn tasks_compare_their_channels_before_a_result_is_used() {
     let output = rig.good_tick(10.0);
     assert_safe(&output, Fault::ChannelsDiffer);
     assert_eq!(output.setpoints[0], output.setpoints[1]);
+}
+
+/// A measurement of straight driving at a speed.
+fn steady(wheel_speed_rpm: f32, current_request_a: f32) -> Measurement<f32> {
+    Measurement {
+        wheel_speed_rpm,
+        yaw_rate_rad_per_s: 0.0,
+        steering_angle_rad: 0.0,
+        steering_rate_rad_per_s: 0.0,
+        current_request_a,
+    }
+}
+
+/// Ticks until the safe state, and its fault; `None` after ten thousand.
+fn found(mut tick: impl FnMut() -> ControlOutput<f32>) -> Option<(u32, Faults)> {
+    (1..10_000).find_map(|ticks| {
+        let output = tick();
+        let faults = Faults::from_bits(output.actuation.faults);
+        (output.actuation.mode == Mode::Safe).then_some((ticks, faults))
+    })
+}
+
+/// The last 256 frames in an endless loop: their counters are always in sequence, and at steady motion
+/// their values as well.
+#[test]
+fn a_replay_of_the_last_frames_is_found() {
+    for wheel_speed_rpm in [300.0, 1000.0] {
+        for settled_ticks in 1500..1532 {
+            let mut rig = Rig::new(&scenario());
+            let mut sent = Vec::new();
+            for _ in 0..settled_ticks {
+                let frame = rig.frame_of(&steady(wheel_speed_rpm, 2.0));
+                sent.push(frame);
+                rig.tick(Some(frame), TICK_COUNTS, |code| code);
+            }
+            let mut replayed = sent[sent.len() - 256..].iter().cycle();
+            let stale = 1 << Warning::FrameStale as u16;
+            let mut warnings = 0;
+            let (ticks, faults) = found(|| {
+                let frame = *replayed.next().unwrap();
+                let output = rig.tick(Some(frame), TICK_COUNTS, |code| code);
+                warnings |= output.actuation.warnings;
+                output
+            })
+            .unwrap();
+            assert_eq!(warnings, stale);
+            assert!(ticks <= 12, "{ticks} ticks");
+            let expected = [Fault::FrameAge, Fault::FramesInvalid].map(Faults::from);
+            assert!(expected.contains(&faults), "{faults:?}");
+        }
+    }
+}
+
+/// One more tick of delay after each eight ticks.
+#[test]
+fn frames_whose_delay_grows_are_found_at_the_greatest_age() {
+    let mut rig = Rig::new(&scenario());
+    for _ in 0..1500 {
+        let frame = rig.frame_of(&steady(1000.0, 2.0));
+        rig.tick(Some(frame), TICK_COUNTS, |code| code);
+    }
+    let mut late = std::collections::VecDeque::new();
+    let mut number = 0;
+    let (ticks, faults) = found(|| {
+        late.push_back(rig.frame_of(&steady(1000.0, 2.0)));
+        let frame = (late.len() > number / 8).then(|| late.pop_front().unwrap());
+        number += 1;
+        rig.tick(frame, TICK_COUNTS, |code| code)
+    })
+    .unwrap();
+    assert_eq!(faults, Fault::FrameAge.into());
+    // Two ticks old without delay; ten are the limit.
+    assert_eq!(ticks, 8 * 9 + 1);
+}
+
+/// A constant delay is tolerated up to the greatest age, and no further.
+#[test]
+fn the_age_of_frames_in_use_has_a_limit() {
+    for (delay, is_used) in [
+        (0, true),
+        (3, true),
+        (8, true),
+        (9, false),
+        (14, false),
+        (30, false),
+    ] {
+        let mut rig = Rig::new(&scenario());
+        let mut late = std::collections::VecDeque::new();
+        let mut mode = Mode::Starting;
+        for _ in 0..2000 {
+            late.push_back(rig.frame_of(&steady(1000.0, 2.0)));
+            let frame = (late.len() > delay).then(|| late.pop_front().unwrap());
+            mode = rig.tick(frame, TICK_COUNTS, |code| code).actuation.mode;
+        }
+        let expected = if is_used {
+            Mode::Active
+        } else {
+            Mode::Starting
+        };
+        assert_eq!(mode, expected, "{delay} ticks");
+    }
+}
+
+/// A vehicle that receives no frame of the ECU returns no challenge.
+#[test]
+fn without_an_answer_the_ecu_does_not_start() {
+    for echo in [0, 0x35, 0xFF] {
+        let mut rig = Rig::new(&scenario());
+        for _ in 0..5000 {
+            let frame = encode_measurement(&steady(1000.0, 2.0), echo, &mut rig.sender);
+            let output = rig.tick(Some(frame), TICK_COUNTS, |code| code);
+            assert_eq!(output.actuation.mode, Mode::Starting);
+            assert_eq!(output.actuation.faults, 0);
+            assert_eq!(rig.codes, [NEUTRAL; 10]);
+        }
+    }
+}
+
+/// An ECU that restarts in the middle of a drive: the vehicle's counter and its echo are those of
+/// before.
+#[test]
+fn a_restarted_ecu_becomes_active_again() {
+    let mut rig = Rig::settled(10.0);
+    for _ in 0..300 {
+        rig.good_tick(10.0);
+        rig.ecu = Ecu::new(&scenario(), CLOCK_HZ).unwrap();
+        let active = (1..100).find(|_| {
+            let output = rig.good_tick(10.0);
+            assert_eq!(output.actuation.faults, 0);
+            output.actuation.mode == Mode::Active
+        });
+        assert!(
+            active.is_some_and(|ticks| ticks <= START_TICKS),
+            "{active:?}"
+        );
+    }
+}
+
+/// At every control rate an ECU starts, and bridges a lost frame.
+#[test]
+fn frames_are_fresh_at_every_control_rate() {
+    for (control_rate_hz, pwm_rate_hz) in
+        [(10, 1000), (100, 1000), (1000, 10_000), (10_000, 100_000)]
+    {
+        let mut scenario = scenario();
+        scenario.run.control_rate_hz = control_rate_hz as f32;
+        scenario.run.pwm_rate_hz = pwm_rate_hz as f32;
+        scenario.dither.waveform = Waveform::None;
+        let mut ecu = Ecu::new(&scenario, CLOCK_HZ).unwrap();
+        let mut sender = Sender::new(SENSOR_DATA_ID);
+        let (mut challenge, mut tick, mut last) = (0, 0, None);
+        while tick < 100 {
+            let answer = |packet: &Packet| {
+                let frame = packet.frame.map(|frame| {
+                    challenge = decode_actuation(&frame).unwrap().challenge;
+                    encode_measurement(&steady(1000.0, 0.0), challenge, &mut sender)
+                });
+                Packet {
+                    frame: frame.filter(|_| tick % 10 != 9),
+                    ..*packet
+                }
+            };
+            let counts = CLOCK_HZ / control_rate_hz;
+            if let Some(output) = ecu.period(answer, || counts) {
+                tick += 1;
+                last = Some(output.actuation);
+            }
+        }
+        let last = last.unwrap();
+        assert_eq!(
+            (last.mode, last.faults),
+            (Mode::Active, 0),
+            "{control_rate_hz} Hz"
+        );
+    }
+}
+
+#[test]
+fn two_of_three_frames_lost_for_good_are_found() {
+    let mut rig = Rig::settled(10.0);
+    let mut number = 0;
+    let (ticks, faults) = found(|| {
+        number += 1;
+        let frame = rig.frame(10.0);
+        rig.tick((number % 3 == 0).then_some(frame), TICK_COUNTS, |code| code)
+    })
+    .unwrap();
+    assert_eq!((ticks, faults), (20, Fault::FramesInvalid.into()));
+}
+
+/// A link that has been that bad from the start does not make the ECU active.
+#[test]
+fn two_of_three_frames_lost_from_the_start_leave_the_servo_neutral() {
+    let mut rig = Rig::new(&scenario());
+    for number in 0..5000 {
+        let frame = rig.frame(10.0);
+        let frame = (number % 3 == 0).then_some(frame);
+        let output = rig.tick(frame, TICK_COUNTS, |code| code);
+        assert_eq!(output.actuation.mode, Mode::Starting);
+        assert_eq!(output.actuation.faults, 0);
+        assert_eq!(rig.codes, [NEUTRAL; 10]);
+    }
+    for _ in 0..30 {
+        rig.good_tick(10.0);
+    }
+    assert_eq!(rig.good_tick(10.0).actuation.mode, Mode::Active);
+}
+
+/// Two in a row now and then, and a random tenth.
+#[test]
+fn some_loss_is_tolerated() {
+    let mut generator = 1_u32;
+    let mut rig = Rig::settled(10.0);
+    for number in 0..20_000 {
+        generator = generator
+            .wrapping_mul(1_664_525)
+            .wrapping_add(1_013_904_223);
+        let is_lost = if number < 5000 {
+            number % 8 < 2
+        } else {
+            generator >> 16 < 6554
+        };
+        let frame = rig.frame(10.0);
+        let output = rig.tick((!is_lost).then_some(frame), TICK_COUNTS, |code| code);
+        assert_eq!(output.actuation.mode, Mode::Active, "tick {number}");
+    }
+}
+
+#[test]
+fn frames_that_are_damaged_for_good_are_invalid() {
+    let mut rig = Rig::settled(10.0);
+    let (ticks, faults) = found(|| {
+        let mut frame = rig.frame(10.0);
+        frame[9] ^= 1;
+        rig.tick(Some(frame), TICK_COUNTS, |code| code)
+    })
+    .unwrap();
+    assert_eq!((ticks, faults), (8, Fault::FramesInvalid.into()));
+}
+
+/// Above the vehicle's limit a warning, with the dither of the schedule's last speed; beyond the
+/// sensor's range a fault.
+#[test]
+fn overspeed_is_a_warning_and_the_dither_stays() {
+    let mut rig = Rig::settled(0.0);
+    let mut speed_rpm = 1750.0;
+    let mut drive = |speed_rpm: f32| {
+        let frame = rig.frame_of(&Measurement {
+            wheel_speed_rpm: speed_rpm,
+            ..measurement(0.0)
+        });
+        rig.tick(Some(frame), TICK_COUNTS, |code| code).actuation
+    };
+    while speed_rpm < 3990.0 {
+        speed_rpm += 1.0;
+        let actuation = drive(speed_rpm);
+        assert_eq!(
+            (actuation.mode, actuation.faults),
+            (Mode::Active, 0),
+            "{speed_rpm} rpm"
+        );
+        let overspeed = 1 << Warning::Overspeed as u16;
+        let expected = if speed_rpm > 2500.0 { overspeed } else { 0 };
+        assert_eq!(actuation.warnings, expected, "{speed_rpm} rpm");
+        assert_eq!(actuation.wheel_speed_limit_rpm, 2500.0);
+        if speed_rpm > 2100.0 {
+            assert_eq!(actuation.dither_amplitude_v, 0.1135);
+        }
+    }
+    drive(4000.0);
+    let actuation = drive(4001.0);
+    assert_eq!(actuation.faults, 1 << Fault::SensorRange as u32);
 }
 
 #[test]
@@ -419,8 +850,14 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
             "dither.sine_frequency_rad_per_s =",
         ),
         (
-            vec!["gate.dither_frequency_max_rad_per_s=15707"],
-            vec!["gate.dither_frequency_max_rad_per_s=15709"],
+            vec![
+                "run.pwm_rate_hz=5000",
+                "gate.dither_frequency_max_rad_per_s=7853",
+            ],
+            vec![
+                "run.pwm_rate_hz=5000",
+                "gate.dither_frequency_max_rad_per_s=7855",
+            ],
             "gate.dither_frequency_max_rad_per_s =",
         ),
         (
@@ -429,9 +866,51 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
             "from 5001 to",
         ),
         (
-            vec!["gate.safe_wheel_speed_rpm=2500"],
-            vec!["gate.safe_wheel_speed_rpm=2501"],
+            vec![
+                "gate.wheel_speed_rpm=1200",
+                "gate.safe_wheel_speed_rpm=1200",
+            ],
+            vec![
+                "gate.wheel_speed_rpm=1200",
+                "gate.safe_wheel_speed_rpm=1201",
+            ],
             "gate.safe_wheel_speed_rpm =",
+        ),
+        (
+            vec!["gate.wheel_speed_rpm=4000"],
+            vec!["gate.wheel_speed_rpm=4001"],
+            "gate.wheel_speed_rpm =",
+        ),
+        (
+            vec!["gate.dither_above_rpm=1550"],
+            vec!["gate.dither_above_rpm=1549"],
+            "gate.dither_above_rpm =",
+        ),
+        (
+            vec!["policy.dither_off_below_rpm=1555"],
+            vec!["policy.hysteresis_rpm=46"],
+            "from 1576",
+        ),
+        (
+            // 0.1055 V at 1575 rpm, and 0.1060 V above it.
+            vec!["gate.square_least_amplitude_v=0.1059"],
+            vec!["gate.square_least_amplitude_v=0.1061"],
+            "gate.square_least_amplitude_v =",
+        ),
+        (
+            vec![sine, "gate.sine_least_amplitude_v=0.9421"],
+            vec![sine, "gate.sine_least_amplitude_v=0.9423"],
+            "gate.sine_least_amplitude_v =",
+        ),
+        (
+            vec!["gate.weak_dither_s=0.502"],
+            vec!["gate.weak_dither_s=0.5"],
+            "gate.weak_dither_s =",
+        ),
+        (
+            vec!["policy.dither_ramp_s=0.69"],
+            vec!["policy.dither_ramp_s=0.7"],
+            "gate.weak_dither_s =",
         ),
         (
             vec!["servo.bus_voltage_v=4.32"],
@@ -446,8 +925,10 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
     // Without dither its frequency is not checked.
     let none = [
         "dither.waveform=none",
-        "gate.dither_frequency_max_rad_per_s=1e6",
+        "gate.dither_frequency_max_rad_per_s=1e4",
+        "run.pwm_rate_hz=5000",
         "gate.square_amplitude_v=0",
+        "gate.dither_above_rpm=0",
     ];
     assert_eq!(refusal(&none), "");
     let mut invalid = scenario();
@@ -496,7 +977,7 @@ proptest! {
         }
         let pwm = Pwm::new(&scenario.servo, 10_000.0);
         let most_v = 4.5 + if is_sine { 1.3 * 1.0012 } else { 0.2 } + pwm.volts_per_count();
-        let mut rig = Rig::new(&scenario);
+        let mut rig = Rig::active(&scenario);
         let mut is_safe = false;
         for (frame, elapsed, pin_error, request_a) in &ticks {
             let frame = match frame {
@@ -506,7 +987,7 @@ proptest! {
                     let measurement = Measurement {
                         wheel_speed_rpm, yaw_rate_rad_per_s, steering_angle_rad, steering_rate_rad_per_s, current_request_a,
                     };
-                    Some(encode_measurement(&measurement, &mut rig.sender))
+                    Some(rig.frame_of(&measurement))
                 }
                 Frame::Bytes(bytes) => Some(*bytes),
             };

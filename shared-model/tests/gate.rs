@@ -3,6 +3,7 @@
 
 use proptest::prelude::*;
 use shared_model::Scenario;
+use shared_model::controller::Controller;
 use shared_model::dither::Waveform;
 use shared_model::gate::{Fault, Faults, Observation, Setpoint, Supervisor};
 use shared_model::signal::{Measurement, Mode};
@@ -40,6 +41,7 @@ fn command(motor_v: f32, dither_amplitude_v: f32) -> Observation<f32> {
     Observation {
         elapsed_counts: TICK_COUNTS,
         measurement: Some(calm()),
+        measurement_age_ticks: 1,
         motor_v,
         dither_amplitude_v,
         found_outside: Faults::NONE,
@@ -92,7 +94,7 @@ fn faults_are_bits_with_names() {
         all |= fault;
         assert!(all.contains(fault) && !all.is_empty());
     }
-    assert_eq!(all.bits(), 0xFFFF);
+    assert_eq!(all.bits(), 0x3_FFFF);
     assert_eq!(all.iter().collect::<Vec<_>>(), Fault::ALL);
     let mut one = Faults::from(Fault::Readback);
     one |= Faults::from(Fault::FrameAge);
@@ -283,20 +285,40 @@ fn frames_grow_too_old() {
         measurement: None,
         ..command(0.0, 0.0)
     };
-    let mut supervisor = active_at(Waveform::Square, 0.0);
-    for _ in 0..3 {
-        for _ in 0..10 {
-            supervisor.run(&none);
+    // The age that the frame had when it came counts too.
+    for age_ticks in [1, 2, 5, 10] {
+        let mut supervisor = active_at(Waveform::Square, 0.0);
+        let aged = Observation {
+            measurement_age_ticks: age_ticks,
+            ..command(0.0, 0.0)
+        };
+        for _ in 0..3 {
+            supervisor.run(&aged);
+            for _ in age_ticks..10 {
+                supervisor.run(&none);
+            }
+            assert_clean(&supervisor);
         }
-        assert_clean(&supervisor);
-        supervisor.run(&command(0.0, 0.0));
-    }
-    for _ in 0..10 {
         supervisor.run(&none);
+        assert_only(&supervisor, Fault::FrameAge);
     }
-    assert_clean(&supervisor);
-    supervisor.run(&none);
+    let mut supervisor = active_at(Waveform::Square, 0.0);
+    supervisor.run(&Observation {
+        measurement_age_ticks: 11,
+        ..command(0.0, 0.0)
+    });
     assert_only(&supervisor, Fault::FrameAge);
+}
+
+/// At any control rate there is room for a lost frame, and no age beyond that of a challenge.
+#[test]
+fn frame_age_is_cut_to_ticks_that_a_challenge_distinguishes() {
+    let mut limits = Scenario::<f32>::reconstruction().gate;
+    let ticks = [10.0, 299.0, 300.0, 1000.0, 1500.0, 1600.0, 1e4, 1e6]
+        .map(|rate_hz| limits.frame_age_ticks(rate_hz));
+    assert_eq!(ticks, [3, 3, 3, 10, 15, 15, 15, 15]);
+    limits.frame_age_s = 1e-3;
+    assert_eq!(limits.frame_age_ticks(1000.0), 3);
 }
 
 /// The age in ticks is the nearest to the limit in seconds, not one less by f32's rounding.
@@ -314,7 +336,7 @@ fn frame_age_is_rounded_to_ticks() {
             ..command(0.0, 0.0)
         };
         supervisor.run(&tick(Some(calm())));
-        for _ in 0..ticks {
+        for _ in 1..ticks {
             supervisor.run(&tick(None));
         }
         assert_clean(&supervisor);
@@ -446,6 +468,190 @@ fn safe_state_ramps_out_and_is_latched() {
     }
 }
 
+/// Ticks from the start of the dither until an amplitude at a speed is found too weak.
+fn weak_after(waveform: Waveform, speed_rpm: f32, amplitude_v: f32) -> Option<u32> {
+    let mut scenario = scenario(waveform);
+    scenario.dither.start_time_s = 0.3;
+    let mut supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+    let observation = Observation {
+        measurement: Some(Measurement {
+            wheel_speed_rpm: speed_rpm,
+            ..calm()
+        }),
+        ..command(0.0, amplitude_v)
+    };
+    for tick in 0..3000 {
+        supervisor.run(&observation);
+        if supervisor.mode() == Mode::Safe {
+            assert_only(&supervisor, Fault::DitherWeak);
+            return Some(tick - 300);
+        }
+    }
+    None
+}
+
+/// Amplitudes down to zero at a speed that needs dither, after its start and the time of its ramp.
+#[test]
+fn dither_that_is_too_weak_is_a_fault() {
+    for (waveform, least_v) in [(Waveform::Square, 0.1_f32), (Waveform::Sine, 0.9)] {
+        for weak_v in [0.0, 0.5 * least_v, least_v.next_down()] {
+            for speed_rpm in [1575.0_f32.next_up(), 1750.0, 2500.0, 3000.0] {
+                // 0.7 s; the tick that finds it is the next one.
+                assert_eq!(weak_after(waveform, speed_rpm, weak_v), Some(701));
+            }
+            for speed_rpm in [0.0, 1000.0, 1575.0] {
+                assert_eq!(weak_after(waveform, speed_rpm, weak_v), None);
+            }
+        }
+        assert_eq!(weak_after(waveform, 1750.0, least_v), None);
+    }
+    assert_eq!(weak_after(Waveform::None, 1750.0, 0.0), None);
+}
+
+/// The time without dither counts from the last sufficient amplitude, also across lost frames.
+#[test]
+fn weak_dither_counts_while_it_lasts() {
+    let mut scenario = scenario(Waveform::Square);
+    scenario.dither.start_time_s = 0.0;
+    let mut supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+    for _ in 0..5 {
+        for tick in 0..700 {
+            supervisor.run(&Observation {
+                measurement: (tick % 5 == 0).then(calm),
+                ..command(0.0, 0.0)
+            });
+        }
+        assert_clean(&supervisor);
+        supervisor.run(&command(0.0, 0.1));
+    }
+    for _ in 0..701 {
+        supervisor.run(&command(0.0, 0.0));
+    }
+    assert_only(&supervisor, Fault::DitherWeak);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// The gate passes the controller's dither at any speeds: through the hysteresis, during the ramps,
+    /// after a late start.
+    #[test]
+    fn the_controllers_dither_is_never_too_weak(
+        legs in prop::collection::vec((1400.0_f32..2100.0, 1.0_f32..20.0, 0_u32..1500), 1..12),
+        is_sine: bool,
+        start_time_s in 0.0_f32..3.0,
+    ) {
+        let mut scenario = scenario(if is_sine { Waveform::Sine } else { Waveform::Square });
+        scenario.dither.start_time_s = start_time_s;
+        let mut controller = Controller::new(&scenario);
+        let mut supervisor = Supervisor::new(&scenario, CLOCK_HZ);
+        let mut speed_rpm = 1400.0_f32;
+        for (target_rpm, step_rpm, ticks) in legs {
+            for _ in 0..ticks {
+                speed_rpm += (target_rpm - speed_rpm).clamp(-step_rpm, step_rpm);
+                let measurement = Measurement { wheel_speed_rpm: speed_rpm, ..calm() };
+                let given = controller.run(&measurement);
+                supervisor.run(&Observation {
+                    measurement: Some(measurement),
+                    ..command(given.motor_v, given.dither_amplitude_v)
+                });
+                prop_assert!(supervisor.faults().is_empty(), "{:?}", supervisor.faults());
+            }
+        }
+    }
+}
+
+/// The bridge is off from the tick on in which the pin or a channel is wrong, in every mode, and
+/// stays off. Other faults leave it on for the ramp.
+#[test]
+fn the_bridge_goes_off_where_a_ramp_cannot_be_trusted() {
+    for fault in Fault::ALL {
+        let is_off = matches!(fault, Fault::Readback | Fault::ChannelsDiffer);
+        let mut active = active_at(Waveform::Square, 1.0);
+        assert!(active.bridge_on());
+        // What caused the safe state is still found in the next ticks.
+        let found = Observation {
+            found_outside: fault.into(),
+            ..command(1.0, 0.0)
+        };
+        for _ in 0..10 {
+            active.run(&found);
+            assert_eq!(active.bridge_on(), !is_off, "{}", fault.name());
+        }
+        active.run(&command(0.0, 0.0));
+        assert_eq!(active.bridge_on(), !is_off, "{}", fault.name());
+        assert_only(&active, fault);
+    }
+}
+
+/// In the safe state a fault of the servo's path that was not known before switches the bridge off;
+/// the faults that caused the safe state stay as they were.
+#[test]
+fn the_safe_state_judges_the_servo() {
+    let servo = [
+        Fault::Readback,
+        Fault::ChannelsDiffer,
+        Fault::DitherAmplitude,
+        Fault::DitherFrequency,
+    ];
+    for fault in Fault::ALL
+        .into_iter()
+        .filter(|&fault| fault != Fault::SensorRange)
+    {
+        let mut safe = active_at(Waveform::Square, 1.0);
+        let mut found = Faults::from(Fault::SensorRange);
+        for _ in 0..10 {
+            safe.run(&Observation {
+                found_outside: found,
+                ..command(1.0, 0.0)
+            });
+            assert!(safe.bridge_on());
+        }
+        found |= fault;
+        safe.run(&Observation {
+            found_outside: found,
+            ..command(1.0, 0.0)
+        });
+        assert_eq!(
+            safe.bridge_on(),
+            !servo.contains(&fault),
+            "{}",
+            fault.name()
+        );
+        assert_only(&safe, Fault::SensorRange);
+    }
+}
+
+#[test]
+fn overspeed_is_no_fault() {
+    let mut supervisor = active_at(Waveform::None, 0.0);
+    for (wheel_speed_rpm, is_overspeed) in [
+        (2490.0, false),
+        (2500.0, false),
+        (2500.0_f32.next_up(), true),
+        (2510.0, true),
+    ] {
+        let mut fast = active_at(Waveform::None, 0.0);
+        let measurement = Measurement {
+            wheel_speed_rpm,
+            ..calm()
+        };
+        assert_eq!(fast.is_overspeed(&measurement), is_overspeed);
+        fast = Supervisor::new(&scenario(Waveform::None), CLOCK_HZ);
+        fast.run(&Observation {
+            measurement: Some(measurement),
+            ..command(0.0, 0.0)
+        });
+        assert_clean(&fast);
+        assert_eq!(fast.wheel_speed_limit_rpm(), 2500.0);
+    }
+    supervisor.run(&command(f32::NAN, 0.0));
+    assert!(
+        !supervisor.is_overspeed(&calm()),
+        "of the vehicle's limit, not the safe state's"
+    );
+}
+
 #[test]
 fn a_restart_forgets_the_fault() {
     let mut stopped = active_at(Waveform::Square, 0.0);
@@ -499,7 +705,7 @@ prop_compose! {
         bits in prop_oneof![20 => Just(0), 1 => any::<u32>()],
     ) -> (Observation<f32>, bool) {
         let found_outside = Faults::from_bits(bits);
-        (Observation { elapsed_counts, measurement, motor_v, dither_amplitude_v, found_outside }, is_change)
+        (Observation { elapsed_counts, measurement, measurement_age_ticks: 1, motor_v, dither_amplitude_v, found_outside }, is_change)
     }
 }
 

@@ -83,10 +83,10 @@ fn ranges_end_at_their_limits() {
         }
     }
     let wheel_speed = |rpm: f32| first(with(at_rest(), WHEEL_SPEED, rpm));
-    for good in [0.0, -0.0, f32::MIN_POSITIVE, 2500.0] {
+    for good in [0.0, -0.0, f32::MIN_POSITIVE, 2500.0, 2501.0, 4000.0] {
         assert_eq!(wheel_speed(good), Faults::NONE);
     }
-    for bad in [-f32::MIN_POSITIVE, -1.0, 2500.0_f32.next_up(), f32::MAX] {
+    for bad in [-f32::MIN_POSITIVE, -1.0, 4000.0_f32.next_up(), f32::MAX] {
         assert_eq!(wheel_speed(bad), only(Fault::SensorRange));
     }
 }

@@ -2,6 +2,7 @@
 
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
+use shared_model::gate::Limits;
 use shared_model::parameter::ParameterSet;
 use shared_model::settings::{Choice, SettingError};
 use shared_model::short::Short;
@@ -30,7 +31,7 @@ macro_rules! each_section {
 
 /// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and
 /// run. The sections' lists and the map of a scenario are both held to it.
-const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 5 + 24 + 8;
+const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 5 + 29 + 8;
 
 /// The floats next to a bound.
 trait Neighbours: Real + FromStr {
@@ -96,6 +97,30 @@ fn ranges<T: Neighbours, P: ParameterSet<T>>(
         }
     }
     P::FIELDS.len()
+}
+
+/// A setting cannot widen a limit of the gate beyond about twice its default, or half of it where the
+/// limit is a least value.
+#[test]
+fn no_setting_widens_a_limit_of_the_gate_beyond_its_hard_bound() {
+    const LEAST: [&str; 3] = [
+        "square_least_amplitude_v",
+        "sine_least_amplitude_v",
+        "dither_frequency_min_rad_per_s",
+    ];
+    let mut limits = Scenario::<f64>::reconstruction().gate;
+    for field in Limits::<f64>::FIELDS {
+        let default = *(field.accessor)(&mut limits);
+        if LEAST.contains(&field.name) {
+            assert!(2.0 * field.min >= default, "{}", field.name);
+        } else {
+            assert!(field.max <= 2.0 * default, "{}", field.name);
+        }
+        let mut scenario = Scenario::<f64>::reconstruction();
+        let setting = format!("gate.{}=1e5", field.name);
+        assert_eq!(scenario.apply(&setting), Ok(()));
+        assert!(scenario.validate().is_err(), "{setting}");
+    }
 }
 
 /// Every number can be set by its name, and setting it changes no other.

@@ -16,6 +16,22 @@ def attribute(message, name):
     return message.dbc.attributes[name].value
 
 
+STATE_MACHINE = [
+    "E2ESMWindowSize",
+    "E2ESMMinOkStateInit",
+    "E2ESMMaxErrorStateInit",
+    "E2ESMMinOkStateValid",
+    "E2ESMMaxErrorStateValid",
+    "E2ESMMinOkStateInvalid",
+    "E2ESMMaxErrorStateInvalid",
+]
+
+
+def state_machine(message):
+    numbers = [attribute(message, name) for name in STATE_MACHINE if name in message.dbc.attributes]
+    return ",".join(map(str, numbers)) if numbers else "none"
+
+
 def description(message):
     return {
         "can_fd": message.is_fd,
@@ -23,6 +39,7 @@ def description(message):
         "profile": attribute(message, "E2EProfile"),
         "data_id": attribute(message, "E2EDataId"),
         "max_delta_counter": attribute(message, "E2EMaxDeltaCounter"),
+        "state_machine": state_machine(message),
     }
 
 

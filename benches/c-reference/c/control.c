@@ -12,12 +12,31 @@
 #define ACTUATOR_DATA_ID 0x5A02
 #define MAX_DELTA_COUNTER 3
 #define ROUNDING 1e-6f
+/* The state machine of the sensor frames: window and thresholds. */
+#define WINDOW 0xFFFFFFu
+#define MIN_OK_INIT 11
+#define MAX_ERROR_INIT 7
+#define MIN_OK_VALID 11
+#define MAX_ERROR_VALID 7
+#define MIN_OK_INVALID 20
+#define MAX_ERROR_INVALID 2
+/* Challenges: start of the generator, greatest age. */
+#define SEED 0x5A015A02u
+#define MAX_AGE_TICKS 15
+#define MIN_AGE_TICKS 3
+/* Bit of the mode byte. */
+#define BRIDGE_ON 0x80
+/* Faults that switch the bridge off, and those that do so if they are new in the safe state. */
+#define BRIDGE_FAULTS (1u << FAULT_READBACK | 1u << FAULT_CHANNELS_DIFFER)
+#define SERVO_FAULTS (BRIDGE_FAULTS | 1u << FAULT_DITHER_AMPLITUDE | 1u << FAULT_DITHER_FREQUENCY)
 
 enum mode { MODE_STARTING, MODE_ACTIVE, MODE_SAFE };
 
 enum reception { RECEIVED, RECEIVED_SOME_LOST, NOTHING_NEW, DAMAGED, REPEATED, WRONG_SEQUENCE };
 
-enum warning { FRAME_MISSING, FRAME_DAMAGED, FRAME_REPEATED, FRAME_SEQUENCE, FRAMES_LOST };
+enum warning { FRAME_MISSING, FRAME_DAMAGED, FRAME_REPEATED, FRAME_SEQUENCE, FRAMES_LOST, FRAME_STALE, OVERSPEED };
+
+enum communication { NO_DATA, INIT, VALID, INVALID };
 
 struct measurement {
     float wheel_speed_rpm;
@@ -54,11 +73,16 @@ struct limits {
     float motor_slew_v_per_s;
     float square_amplitude_v;
     float sine_amplitude_v;
+    float dither_above_rpm;
+    float square_least_amplitude_v;
+    float sine_least_amplitude_v;
+    float weak_dither_s;
     float dither_frequency_min_rad_per_s;
     float dither_frequency_max_rad_per_s;
     float ramp_out_s;
     float safe_wheel_speed_rpm;
     float wheel_speed_rpm;
+    float wheel_speed_sensor_rpm;
     float wheel_acceleration_rpm_per_s;
     float yaw_rate_rad_per_s;
     float yaw_acceleration_rad_per_s2;
@@ -97,13 +121,34 @@ struct supervisor {
     uint32_t window_least_counts;
     uint32_t window_most_counts;
     uint32_t frame_age_ticks;
-    uint32_t ticks_since_frame;
+    uint32_t age_ticks;
+    float least_dither_v;
+    uint32_t max_weak_ticks;
+    uint32_t ticks_to_dither;
+    uint32_t weak_ticks;
     enum mode mode;
     uint32_t faults;
+    uint32_t found_outside;
+    uint32_t bridge_on;
     struct reference_setpoint setpoint;
 };
 
+struct challenger {
+    uint64_t nibbles;
+    uint32_t generator;
+    uint8_t number;
+    uint8_t sent;
+};
+
+struct state_machine {
+    uint32_t ok;
+    uint32_t error;
+    enum communication state;
+};
+
 struct channel {
+    struct challenger challenger;
+    struct state_machine state_machine;
     struct measurement measurement;
     uint32_t has_measurement;
     struct controller controller;
@@ -152,6 +197,61 @@ static inline enum reception receive(struct channel *channel, const struct refer
     if (delta == 1)
         return RECEIVED;
     return delta <= MAX_DELTA_COUNTER ? RECEIVED_SOME_LOST : WRONG_SEQUENCE;
+}
+
+static inline uint8_t next_challenge(struct challenger *challenger)
+{
+    uint32_t generator = challenger->generator;
+
+    generator ^= generator << 13;
+    generator ^= generator >> 17;
+    generator ^= generator << 5;
+    challenger->generator = generator;
+    challenger->nibbles = challenger->nibbles << 4 | generator >> 28;
+    challenger->number = (challenger->number + 1) & 0xF;
+    if (challenger->sent < MAX_AGE_TICKS)
+        challenger->sent++;
+    return (uint8_t)(generator >> 28 << 4 | challenger->number);
+}
+
+/* Control ticks since the challenge that was returned; 0 if it is none of the last. */
+static inline uint32_t age_ticks(const struct challenger *challenger, uint8_t echo)
+{
+    const uint32_t age = (uint32_t)(challenger->number + 1 - echo) & 0xF;
+    const uint32_t behind = (age - 1) & 0xF;
+    const uint32_t nibble = (uint32_t)(challenger->nibbles >> 4 * behind) & 0xF;
+
+    return age >= 1 && age <= challenger->sent && nibble == (uint32_t)(echo >> 4) ? age : 0;
+}
+
+static inline bool holds(const struct state_machine *machine, int min_ok, int max_error)
+{
+    return __builtin_popcount(machine->error) <= max_error && __builtin_popcount(machine->ok) >= min_ok;
+}
+
+static inline enum communication check_state(struct state_machine *machine, enum reception reception, bool is_stale)
+{
+    const bool is_error = is_stale || reception == DAMAGED;
+    const bool is_ok = !is_stale && (reception == RECEIVED || reception == RECEIVED_SOME_LOST);
+
+    if (machine->state == NO_DATA) {
+        if (!is_error && reception != NOTHING_NEW)
+            machine->state = INIT;
+        return machine->state;
+    }
+    machine->ok = (machine->ok << 1 | is_ok) & WINDOW;
+    machine->error = (machine->error << 1 | is_error) & WINDOW;
+    if (machine->state == INIT) {
+        if (__builtin_popcount(machine->error) > MAX_ERROR_INIT)
+            machine->state = INVALID;
+        else if (__builtin_popcount(machine->ok) >= MIN_OK_INIT)
+            machine->state = VALID;
+    } else if (machine->state == VALID) {
+        machine->state = holds(machine, MIN_OK_VALID, MAX_ERROR_VALID) ? VALID : INVALID;
+    } else {
+        machine->state = holds(machine, MIN_OK_INVALID, MAX_ERROR_INVALID) ? VALID : INVALID;
+    }
+    return machine->state;
 }
 
 static inline uint16_t warnings(enum reception reception)
@@ -230,6 +330,12 @@ static inline struct reference_setpoint controller_run(struct controller *contro
                                    controller->amplitude_v };
 }
 
+static inline bool is_finite(const struct measurement *now)
+{
+    return isfinite(now->wheel_speed_rpm) && isfinite(now->yaw_rate_rad_per_s) && isfinite(now->steering_angle_rad) &&
+           isfinite(now->steering_rate_rad_per_s) && isfinite(now->current_request_a);
+}
+
 /* Magnitude at most bound; false for NaN. */
 static inline bool is_within(float value, float bound)
 {
@@ -284,7 +390,7 @@ static inline uint32_t check_measurement(struct plausibility *plausibility, cons
           is_a_number(now->current_request_a)))
         return 1u << FAULT_SENSOR_NOT_A_NUMBER;
 
-    const bool in_range = now->wheel_speed_rpm >= 0.0f && now->wheel_speed_rpm <= limits->wheel_speed_rpm &&
+    const bool in_range = now->wheel_speed_rpm >= 0.0f && now->wheel_speed_rpm <= limits->wheel_speed_sensor_rpm &&
                           is_within(now->yaw_rate_rad_per_s, limits->yaw_rate_rad_per_s) &&
                           is_within(now->steering_angle_rad, limits->steering_angle_rad) &&
                           is_within(now->steering_rate_rad_per_s, limits->steering_rate_rad_per_s) &&
@@ -313,19 +419,36 @@ static inline uint32_t command_faults(const struct supervisor *supervisor, const
            fault_if(!is_amplitude, FAULT_DITHER_AMPLITUDE);
 }
 
-static inline uint32_t judge(struct supervisor *supervisor, const struct measurement *now,
+/* A control tick of an active ECU: the dither has been too weak for too long. */
+static inline bool is_dither_missed(struct supervisor *supervisor, float amplitude_v)
+{
+    if (supervisor->ticks_to_dither > 0) {
+        supervisor->ticks_to_dither--;
+        return false;
+    }
+    const bool is_needed = supervisor->plausibility.has_last &&
+                           supervisor->plausibility.last.wheel_speed_rpm > supervisor->limits.dither_above_rpm;
+    if (!(is_needed && amplitude_v < supervisor->least_dither_v))
+        supervisor->weak_ticks = 0;
+    else if (supervisor->weak_ticks != UINT32_MAX)
+        supervisor->weak_ticks++;
+    return supervisor->weak_ticks > supervisor->max_weak_ticks;
+}
+
+static inline uint32_t judge(struct supervisor *supervisor, const struct measurement *now, uint32_t frame_ticks,
                              const struct reference_setpoint *command, uint32_t elapsed_counts)
 {
     uint32_t faults = check_measurement(&supervisor->plausibility, &supervisor->limits, now) |
                       command_faults(supervisor, command);
 
+    if (now)
+        supervisor->age_ticks = frame_ticks;
+    else if (supervisor->age_ticks != UINT32_MAX)
+        supervisor->age_ticks++;
     if (supervisor->mode == MODE_STARTING)
         return faults;
-    if (now)
-        supervisor->ticks_since_frame = 0;
-    else if (supervisor->ticks_since_frame != UINT32_MAX)
-        supervisor->ticks_since_frame++;
-    faults |= fault_if(supervisor->ticks_since_frame > supervisor->frame_age_ticks, FAULT_FRAME_AGE);
+    faults |= fault_if(supervisor->age_ticks > supervisor->frame_age_ticks, FAULT_FRAME_AGE);
+    faults |= fault_if(is_dither_missed(supervisor, command->dither_amplitude_v), FAULT_DITHER_WEAK);
     faults |= fault_if(elapsed_counts < supervisor->window_least_counts ||
                            elapsed_counts > supervisor->window_most_counts,
                        FAULT_TICK_WINDOW);
@@ -348,12 +471,17 @@ static inline void towards_neutral(struct supervisor *supervisor)
         setpoint->dither_amplitude_v = 0.0f;
 }
 
-static inline void supervisor_run(struct supervisor *supervisor, const struct measurement *now,
+static inline void supervisor_run(struct supervisor *supervisor, const struct measurement *now, uint32_t frame_ticks,
                                   const struct reference_setpoint *command, uint32_t elapsed_counts,
                                   uint32_t found_outside)
 {
+    const uint32_t added = found_outside & ~supervisor->found_outside;
+
+    if (found_outside & BRIDGE_FAULTS || (supervisor->mode == MODE_SAFE && added & SERVO_FAULTS))
+        supervisor->bridge_on = false;
+    supervisor->found_outside |= found_outside;
     if (supervisor->mode != MODE_SAFE) {
-        supervisor->faults |= found_outside | judge(supervisor, now, command, elapsed_counts);
+        supervisor->faults |= found_outside | judge(supervisor, now, frame_ticks, command, elapsed_counts);
         if (supervisor->faults)
             supervisor->mode = MODE_SAFE;
         else if (now)
@@ -371,18 +499,32 @@ static inline struct reference_actuation channel_run(struct channel *channel, co
                                                 uint32_t found_outside)
 {
     const enum reception reception = receive(channel, input);
-    const bool is_new = reception == RECEIVED || reception == RECEIVED_SOME_LOST;
+    const bool is_whole = reception == RECEIVED || reception == RECEIVED_SOME_LOST;
     struct supervisor *supervisor = &channel->supervisor;
+    const uint32_t ticks = is_whole ? age_ticks(&channel->challenger, input->frame[3]) : 0;
+    const bool is_fresh = ticks != 0 && ticks <= supervisor->frame_age_ticks;
+    const bool is_stale = is_whole && !is_fresh;
+    const enum communication state = check_state(&channel->state_machine, reception, is_stale);
+    const bool is_new = is_fresh && state == VALID;
+    bool is_overspeed = false;
     struct reference_setpoint command = { 0.0f, 0.0f };
 
+    struct measurement now;
+
     if (is_new) {
-        memcpy(&channel->measurement, input->frame + 4, sizeof channel->measurement);
-        channel->has_measurement = true;
+        memcpy(&now, input->frame + 4, sizeof now);
+        if (is_finite(&now)) {
+            channel->measurement = now;
+            channel->has_measurement = true;
+        }
         channel->valid_counter = channel->received_counter;
+        is_overspeed = now.wheel_speed_rpm > supervisor->limits.wheel_speed_rpm;
     }
     if (channel->has_measurement)
         command = controller_run(&channel->controller, &channel->measurement);
-    supervisor_run(supervisor, is_new ? &channel->measurement : NULL, &command, input->elapsed_counts, found_outside);
+    found_outside |= fault_if(state == INVALID && supervisor->mode == MODE_ACTIVE, FAULT_FRAMES_INVALID);
+    supervisor_run(supervisor, is_new ? &now : NULL, ticks, &command, input->elapsed_counts,
+                   found_outside);
     return (struct reference_actuation){
         .mode = supervisor->mode,
         .faults = supervisor->faults,
@@ -390,8 +532,10 @@ static inline struct reference_actuation channel_run(struct channel *channel, co
         .dither_amplitude_v = supervisor->setpoint.dither_amplitude_v,
         .wheel_speed_limit_rpm = supervisor->mode == MODE_ACTIVE ? supervisor->limits.wheel_speed_rpm :
                                                                    supervisor->limits.safe_wheel_speed_rpm,
-        .warnings = warnings(reception),
+        .warnings = (uint16_t)(warnings(reception) | is_stale << FRAME_STALE | is_overspeed << OVERSPEED),
         .sensor_counter = channel->valid_counter,
+        .bridge_on = supervisor->bridge_on && input->bridge_on,
+        .challenge = next_challenge(&channel->challenger),
     };
 }
 
@@ -407,15 +551,16 @@ static inline struct reference_actuation report(struct channel *channel, const s
     struct reference_actuation actuation = *own;
 
     actuation.wheel_speed_limit_rpm = lower(own->wheel_speed_limit_rpm, other->wheel_speed_limit_rpm);
+    actuation.bridge_on = own->bridge_on && other->bridge_on;
     frame[2] = channel->sent_counter++;
-    frame[3] = (uint8_t)actuation.mode;
+    frame[3] = (uint8_t)(actuation.mode | (actuation.bridge_on ? BRIDGE_ON : 0));
     memcpy(frame + 4, &actuation.faults, 4);
     memcpy(frame + 8, &actuation.motor_voltage_v, 4);
     memcpy(frame + 12, &actuation.dither_amplitude_v, 4);
     memcpy(frame + 16, &actuation.wheel_speed_limit_rpm, 4);
     memcpy(frame + 20, &actuation.warnings, 2);
     frame[22] = actuation.sensor_counter;
-    frame[23] = 0;
+    frame[23] = actuation.challenge;
     const uint16_t crc = checksum(frame, ACTUATOR_DATA_ID);
     memcpy(frame, &crc, 2);
     return actuation;
@@ -438,6 +583,8 @@ void reference_control_tick(void *memory, const void *given, void *result)
     task->frames_differed = !channels_agree(frame, other_frame, sizeof frame);
     output->setpoints[0] = a->supervisor.setpoint;
     output->setpoints[1] = b->supervisor.setpoint;
+    output->bridge_on[0] = a->supervisor.bridge_on;
+    output->bridge_on[1] = b->supervisor.bridge_on;
     memcpy(output->frame, frame, sizeof frame);
 }
 
@@ -448,11 +595,16 @@ static const struct limits RECONSTRUCTION = {
     .motor_slew_v_per_s = 4.0f,
     .square_amplitude_v = 0.2f,
     .sine_amplitude_v = 1.3f,
+    .dither_above_rpm = 1575.0f,
+    .square_least_amplitude_v = 0.1f,
+    .sine_least_amplitude_v = 0.9f,
+    .weak_dither_s = 0.7f,
     .dither_frequency_min_rad_per_s = 1500.0f,
     .dither_frequency_max_rad_per_s = 5000.0f,
     .ramp_out_s = 0.1f,
     .safe_wheel_speed_rpm = 1100.0f,
     .wheel_speed_rpm = 2500.0f,
+    .wheel_speed_sensor_rpm = 4000.0f,
     .wheel_acceleration_rpm_per_s = 20000.0f,
     .yaw_rate_rad_per_s = 4.0f,
     .yaw_acceleration_rad_per_s2 = 200.0f,
@@ -519,7 +671,14 @@ static void supervisor_init(struct supervisor *supervisor, const struct referenc
     supervisor->ramp_v = amplitude_limit_v * period_s / limits->ramp_out_s;
     supervisor->window_least_counts = (uint32_t)(counts - tolerance);
     supervisor->window_most_counts = (uint32_t)(counts + tolerance);
-    supervisor->frame_age_ticks = (uint32_t)(limits->frame_age_s * CONTROL_RATE_HZ + 0.5f);
+    const uint32_t ticks = (uint32_t)(limits->frame_age_s * CONTROL_RATE_HZ + 0.5f);
+    supervisor->frame_age_ticks = ticks < MIN_AGE_TICKS ? MIN_AGE_TICKS : ticks > MAX_AGE_TICKS ? MAX_AGE_TICKS : ticks;
+    supervisor->least_dither_v = choice->waveform == WAVEFORM_SQUARE ? limits->square_least_amplitude_v :
+                                 choice->waveform == WAVEFORM_SINE   ? limits->sine_least_amplitude_v :
+                                                                       0.0f;
+    supervisor->max_weak_ticks = (uint32_t)(limits->weak_dither_s * CONTROL_RATE_HZ + 0.5f);
+    supervisor->ticks_to_dither = (uint32_t)(choice->start_time_s * CONTROL_RATE_HZ + 0.5f);
+    supervisor->bridge_on = true;
 }
 
 size_t reference_control_size(void)
@@ -535,6 +694,7 @@ void reference_control_init(void *memory, const struct reference_choice *choice)
     memset(task, 0, sizeof *task);
     for (int i = 0; i < 2; i++) {
         struct channel *channel = &task->channels[i];
+        channel->challenger.generator = SEED;
         channel->received_counter = UINT8_MAX;
         channel->valid_counter = UINT8_MAX;
         controller_init(&channel->controller, choice);

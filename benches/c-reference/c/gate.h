@@ -21,6 +21,8 @@ enum fault {
     FAULT_DITHER_FREQUENCY,
     FAULT_READBACK,
     FAULT_CHANNELS_DIFFER,
+    FAULT_FRAMES_INVALID,
+    FAULT_DITHER_WEAK,
 };
 
 static inline uint32_t fault_if(int found, enum fault fault)

@@ -46,6 +46,7 @@ struct channel {
     struct reference_setpoint setpoint;
     uint32_t periods_per_tick;
     uint32_t periods_to_tick;
+    uint32_t bridge_on;
 };
 
 struct task {
@@ -57,6 +58,7 @@ struct task {
 struct period {
     uint16_t duty_code;
     bool control_due;
+    bool bridge_on;
 };
 
 /* Sine as the crate micromath approximates it. */
@@ -174,6 +176,9 @@ static inline struct period channel_begin(struct channel *channel)
         period.control_due = true;
         channel->periods_to_tick = channel->periods_per_tick;
     }
+    if (channel->limiter.faults & 1u << FAULT_READBACK)
+        channel->bridge_on = false;
+    period.bridge_on = channel->bridge_on;
     return period;
 }
 
@@ -187,28 +192,39 @@ static inline uint16_t greatest(uint16_t a, uint16_t b)
     return a < b ? b : a;
 }
 
+/* Where the channels differ, memory was changed. */
+static inline void channels_differ(struct task *task)
+{
+    task->faults |= 1u << FAULT_CHANNELS_DIFFER;
+    task->channels[0].bridge_on = false;
+    task->channels[1].bridge_on = false;
+}
+
 static inline struct period task_begin(struct task *task)
 {
     struct channel *a = &task->channels[0], *b = &task->channels[1];
     const struct period period_a = channel_begin(a);
     const struct period period_b = channel_begin(b);
-    const bool differ = period_a.duty_code != period_b.duty_code || period_a.control_due != period_b.control_due;
+    const bool differ = period_a.duty_code != period_b.duty_code || period_a.control_due != period_b.control_due ||
+                        period_a.bridge_on != period_b.bridge_on;
     const uint16_t lower = least(period_a.duty_code, period_b.duty_code);
     const uint16_t upper = greatest(period_a.duty_code, period_b.duty_code);
     /* Of the two the duty nearer to neutral, and neutral itself if they lie on both sides of it. */
     const uint16_t code = least(greatest(task->neutral_code, lower), upper);
 
-    task->faults |= fault_if(differ, FAULT_CHANNELS_DIFFER);
+    if (differ)
+        channels_differ(task);
     a->limiter.expected_code = code;
     b->limiter.expected_code = code;
-    return (struct period){ code, period_a.control_due || period_b.control_due };
+    return (struct period){ code, period_a.control_due || period_b.control_due, !differ && period_a.bridge_on };
 }
 
 static inline uint32_t task_faults(struct task *task)
 {
     const struct channel *a = &task->channels[0], *b = &task->channels[1];
 
-    task->faults |= fault_if(!channels_agree(a, b, sizeof *a), FAULT_CHANNELS_DIFFER);
+    if (!channels_agree(a, b, sizeof *a))
+        channels_differ(task);
     task->faults |= a->limiter.faults | b->limiter.faults;
     return task->faults;
 }
@@ -221,13 +237,16 @@ void reference_pwm_period(void *memory, const void *given, void *result)
     const struct period period = task_begin(task);
 
     if (period.control_due && input->has_setpoints) {
-        task->channels[0].setpoint = input->setpoints[0];
-        task->channels[1].setpoint = input->setpoints[1];
+        for (int i = 0; i < 2; i++) {
+            task->channels[i].setpoint = input->setpoints[i];
+            task->channels[i].bridge_on &= input->bridge_on[i];
+        }
     }
     for (int i = 0; i < 2; i++)
         limiter_observe(&task->channels[i].limiter, period.duty_code ^ input->pin_error);
     output->duty_code = period.duty_code;
     output->control_due = period.control_due;
+    output->bridge_on = period.bridge_on;
     output->faults = period.control_due ? task_faults(task) : 0;
 }
 
@@ -260,5 +279,6 @@ void reference_pwm_init(void *memory, const struct reference_choice *choice)
         channel->servo.counts_per_volt = channel->servo.midpoint / 12.0f;
         channel->periods_per_tick = PERIODS_PER_TICK;
         channel->periods_to_tick = PERIODS_PER_TICK;
+        channel->bridge_on = true;
     }
 }

@@ -59,6 +59,7 @@ struct reference_setpoint {
 struct reference_pwm_input {
     bool has_setpoints;
     struct reference_setpoint setpoints[2];
+    bool bridge_on[2];
     /* Bits in which the pin shows another duty code than was put out. */
     uint16_t pin_error;
 };
@@ -66,6 +67,7 @@ struct reference_pwm_input {
 struct reference_pwm_output {
     uint16_t duty_code;
     bool control_due;
+    bool bridge_on;
     /* Where a control tick is due. */
     uint32_t faults;
 };
@@ -75,6 +77,7 @@ struct reference_control_input {
     uint8_t frame[FRAME_LEN];
     uint32_t elapsed_counts;
     uint32_t found_by_pwm;
+    bool bridge_on;
 };
 
 struct reference_actuation {
@@ -85,10 +88,13 @@ struct reference_actuation {
     float wheel_speed_limit_rpm;
     uint16_t warnings;
     uint8_t sensor_counter;
+    bool bridge_on;
+    uint8_t challenge;
 };
 
 struct reference_control_output {
     struct reference_setpoint setpoints[2];
+    bool bridge_on[2];
     uint8_t frame[FRAME_LEN];
     struct reference_actuation actuation;
 };

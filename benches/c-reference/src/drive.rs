@@ -35,10 +35,10 @@ impl Drive {
         }
     }
 
-    /// The sensor frame of a tick, if one comes.
-    pub fn frame(&mut self, tick: u32) -> Option<FrameBytes> {
+    /// The sensor frame of a tick, if one comes; it returns the ECU's last challenge.
+    pub fn frame(&mut self, tick: u32, challenge: u8) -> Option<FrameBytes> {
         integrate::step(&self.model, &mut self.state, self.step_s, Injection::Off);
-        let mut frame = encode_measurement(&self.measurement(tick), &mut self.sender);
+        let mut frame = encode_measurement(&self.measurement(tick), challenge, &mut self.sender);
         let last = self.last.replace(frame);
         if tick < 5 || tick % 97 == 13 {
             return None;

@@ -125,6 +125,7 @@ impl From<&Setpoint<f32>> for SetpointBits {
 pub struct PwmInputOf {
     has_setpoints: bool,
     setpoints: [SetpointBits; 2],
+    bridge_on: [bool; 2],
     pin_error: u16,
 }
 
@@ -133,6 +134,7 @@ impl PwmInputOf {
         Self {
             has_setpoints: output.is_some(),
             setpoints: output.map_or_else(Default::default, setpoints),
+            bridge_on: output.map_or([false; 2], |output| output.bridge_on),
             pin_error,
         }
     }
@@ -149,6 +151,7 @@ fn setpoints(output: &ControlOutput<f32>) -> [SetpointBits; 2] {
 pub struct PwmOutput {
     pub duty_code: u16,
     pub control_due: bool,
+    pub bridge_on: bool,
     /// Where a control tick is due.
     pub faults: u32,
 }
@@ -160,6 +163,7 @@ pub struct ControlInputOf {
     frame: [u8; FRAME_LEN],
     elapsed_counts: u32,
     found_by_pwm: u32,
+    bridge_on: bool,
 }
 
 impl From<&ControlInput> for ControlInputOf {
@@ -169,6 +173,7 @@ impl From<&ControlInput> for ControlInputOf {
             frame: input.frame.unwrap_or_default(),
             elapsed_counts: input.elapsed_counts,
             found_by_pwm: input.found_by_pwm.bits(),
+            bridge_on: input.bridge_on,
         }
     }
 }
@@ -178,6 +183,7 @@ impl From<&ControlInput> for ControlInputOf {
 #[derive(Clone, Copy, Default, PartialEq)]
 pub struct ControlOutputBits {
     setpoints: [SetpointBits; 2],
+    bridges_on: [bool; 2],
     frame: [u8; FRAME_LEN],
     mode: u32,
     faults: u32,
@@ -186,6 +192,8 @@ pub struct ControlOutputBits {
     wheel_speed_limit_rpm: u32,
     warnings: u16,
     sensor_counter: u8,
+    bridge_on: bool,
+    challenge: u8,
 }
 
 impl From<&ControlOutput<f32>> for ControlOutputBits {
@@ -193,6 +201,7 @@ impl From<&ControlOutput<f32>> for ControlOutputBits {
         let actuation = &output.actuation;
         Self {
             setpoints: setpoints(output),
+            bridges_on: output.bridge_on,
             frame: output.frame,
             mode: actuation.mode as u32,
             faults: actuation.faults,
@@ -201,6 +210,8 @@ impl From<&ControlOutput<f32>> for ControlOutputBits {
             wheel_speed_limit_rpm: actuation.wheel_speed_limit_rpm.to_bits(),
             warnings: actuation.warnings,
             sensor_counter: actuation.sensor_counter,
+            bridge_on: actuation.bridge_on,
+            challenge: actuation.challenge,
         }
     }
 }

@@ -259,6 +259,7 @@ unsafe extern "C" fn period(task: *mut c_void, input: *const c_void, output: *mu
     *output = PwmOutput {
         duty_code: period.duty.code(),
         control_due: period.control_due,
+        bridge_on: period.bridge_on,
         faults: if period.control_due {
             task.faults().bits()
         } else {
@@ -317,10 +318,12 @@ fn run_ecu(scenario: &Scenario<f32>, ecu: Ecu<f32>, choice: &Choice) -> Option<b
         if !rust.control_due {
             continue;
         }
+        let challenge = input.output.map_or(0, |output| output.actuation.challenge);
         let tick_input = ControlInput {
-            frame: drive.frame(ticks),
+            frame: drive.frame(ticks, challenge),
             elapsed_counts: nominal_counts,
             found_by_pwm: Faults::from_bits(rust.faults),
+            bridge_on: rust.bridge_on,
         };
         ticks += 1;
         let mut rust = input.output.unwrap_or(NO_OUTPUT);
@@ -347,6 +350,7 @@ const NO_OUTPUT: ControlOutput<f32> = ControlOutput {
         motor_v: 0.0,
         dither_amplitude_v: 0.0,
     }; 2],
+    bridge_on: [true; 2],
     frame: [0; FRAME_LEN],
     actuation: Actuation {
         mode: Mode::Starting,
@@ -356,6 +360,8 @@ const NO_OUTPUT: ControlOutput<f32> = ControlOutput {
         wheel_speed_limit_rpm: 0.0,
         warnings: 0,
         sensor_counter: 0,
+        bridge_on: true,
+        challenge: 0,
     },
 };
 

@@ -39,6 +39,7 @@ impl PwmInterrupt {
             packet: Packet {
                 // As it is on the pin.
                 duty_code: Current::pwm_output().0,
+                bridge_on: begun.bridge_on,
                 frame: begun.frame,
             },
             pwm_cost: if begun.control_due {

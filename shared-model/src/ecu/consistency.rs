@@ -23,8 +23,16 @@ pub(super) fn check<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
         T::zero(),
         gate.wheel_speed_rpm,
     )?;
+    require(
+        "gate",
+        "wheel_speed_rpm",
+        gate.wheel_speed_rpm,
+        T::zero(),
+        gate.wheel_speed_sensor_rpm,
+    )?;
     check_motor(scenario)?;
-    check_dither(scenario)
+    check_dither(scenario)?;
+    check_least_dither(scenario)
 }
 
 fn check_motor<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
@@ -88,6 +96,43 @@ fn check_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     )?;
     let frequency_rad_per_s = scenario.dither.frequency_rad_per_s();
     require("dither", frequency, frequency_rad_per_s, slowest, fastest)
+}
+
+/// The gate must pass the scheduled amplitudes above its speed, and the ramp to them.
+fn check_least_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
+    let (gate, policy) = (&scenario.gate, &scenario.policy);
+    let (name, least_v) = match scenario.dither.waveform {
+        Waveform::None => return Ok(()),
+        Waveform::Square => ("square_least_amplitude_v", gate.square_least_amplitude_v),
+        Waveform::Sine => ("sine_least_amplitude_v", gate.sine_least_amplitude_v),
+    };
+    let unlimited = T::from_f64(1e6);
+    let on_from_rpm = policy.dither_off_below_rpm + policy.hysteresis_rpm;
+    let above_rpm = gate.dither_above_rpm;
+    require(
+        "gate",
+        "dither_above_rpm",
+        above_rpm,
+        on_from_rpm,
+        unlimited,
+    )?;
+    let table = Table::of(scenario.dither.waveform);
+    require(
+        "gate",
+        name,
+        least_v,
+        T::zero(),
+        table.least_above_v(above_rpm),
+    )?;
+    // A ramp to the greatest amplitude, and one tick for its start.
+    let ramp_s = policy.dither_ramp_s + T::one() / scenario.run.control_rate_hz;
+    require(
+        "gate",
+        "weak_dither_s",
+        gate.weak_dither_s,
+        ramp_s,
+        unlimited,
+    )
 }
 
 fn require<T: Real>(

@@ -1,40 +1,15 @@
 //! The task at the control rate: frame, controller, gate.
 
 use super::dual_channel::DualChannel;
+use super::reception::Reception;
+use super::warning;
 use crate::controller::{Command, Controller};
-use crate::e2e::{Receiver, Sender, Status};
+use crate::e2e::Sender;
 use crate::exchange::FrameBytes;
-use crate::frame::{
-    ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_measurement, encode_actuation,
-};
+use crate::frame::{ACTUATOR_DATA_ID, decode_measurement, encode_actuation};
 use crate::gate::{Fault, Faults, Observation, Setpoint, Supervisor};
-use crate::listed;
-use crate::signal::{Actuation, Measurement};
+use crate::signal::{Actuation, Measurement, Mode};
 use crate::{Real, Scenario};
-
-listed! {
-    /// An event that is detected and tolerated. The number is its bit in a frame.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-    #[repr(u8)]
-    pub enum Warning {
-        /// A sensor frame is missing.
-        FrameMissing = 0 => "frame missing",
-        /// A sensor frame was damaged, or another frame in its place.
-        FrameDamaged = 1 => "frame damaged",
-        /// A sensor frame came twice.
-        FrameRepeated = 2 => "frame repeated",
-        /// A sensor frame came out of sequence.
-        FrameSequence = 3 => "frame sequence",
-        /// Sensor frames before this one were lost.
-        FramesLost = 4 => "frames lost",
-    }
-}
-
-impl Warning {
-    fn bit(self) -> u16 {
-        1 << self as u16
-    }
-}
 
 /// Input of a control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +20,8 @@ pub struct ControlInput {
     pub elapsed_counts: u32,
     /// Faults found by the PWM task.
     pub found_by_pwm: Faults,
+    /// Whether the PWM task has the servo's bridge on.
+    pub bridge_on: bool,
 }
 
 impl ControlInput {
@@ -53,6 +30,7 @@ impl ControlInput {
         frame: None,
         elapsed_counts: 0,
         found_by_pwm: Faults::NONE,
+        bridge_on: true,
     };
 }
 
@@ -61,6 +39,8 @@ impl ControlInput {
 pub struct ControlOutput<T> {
     /// For the PWM task, one a channel.
     pub setpoints: [Setpoint<T>; 2],
+    /// Whether the servo's bridge may be on, for the PWM task, one a channel.
+    pub bridge_on: [bool; 2],
     /// The actuator frame.
     pub frame: FrameBytes,
     /// Content of the frame.
@@ -69,9 +49,7 @@ pub struct ControlOutput<T> {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Channel<T> {
-    receiver: Receiver,
-    /// Counter of the last valid frame.
-    counter: u8,
+    reception: Reception,
     measurement: Option<Measurement<T>>,
     controller: Controller<T>,
     supervisor: Supervisor<T>,
@@ -80,14 +58,19 @@ struct Channel<T> {
 
 impl<T: Real> Channel<T> {
     fn run(&mut self, input: &ControlInput, found_outside: Faults) -> (Setpoint<T>, Actuation<T>) {
-        let status = self.receiver.check(input.frame.as_ref());
-        let new = input.frame.as_ref().filter(|_| status.is_ok());
-        let new =
-            new.map(|frame| decode_measurement(frame).map(&|signal| T::from_f64(signal.into())));
-        self.measurement = new.or(self.measurement);
-        if new.is_some() {
-            self.counter = self.receiver.counter();
-        }
+        let frame = input.frame.as_ref();
+        let received = self
+            .reception
+            .check(frame, self.supervisor.frame_age_ticks());
+        let new = frame
+            .filter(|_| received.usable_age_ticks.is_some())
+            .map(|frame| decode_measurement(frame).map(&|signal| T::from_f64(signal.into())));
+        // The gate finds a signal that is not a number. It must not enter the state: NaN is not equal
+        // to itself, so that the channels would differ for good.
+        self.measurement = new.filter(Measurement::is_finite).or(self.measurement);
+        let is_active = self.supervisor.mode() == Mode::Active;
+        let mut found_outside = found_outside;
+        found_outside.add_if(received.is_invalid && is_active, Fault::FramesInvalid);
         let command = match &self.measurement {
             Some(measurement) => self.controller.run(measurement),
             None => Command {
@@ -98,44 +81,38 @@ impl<T: Real> Channel<T> {
         let setpoint = self.supervisor.run(&Observation {
             elapsed_counts: input.elapsed_counts,
             measurement: new,
+            measurement_age_ticks: received.usable_age_ticks.unwrap_or(0),
             motor_v: command.motor_v,
             dither_amplitude_v: command.dither_amplitude_v,
             found_outside,
         });
+        let is_overspeed = new.is_some_and(|now| self.supervisor.is_overspeed(&now));
         let actuation = Actuation {
             mode: self.supervisor.mode(),
             faults: self.supervisor.faults().bits(),
             motor_voltage_v: setpoint.motor_v,
             dither_amplitude_v: setpoint.dither_amplitude_v,
             wheel_speed_limit_rpm: self.supervisor.wheel_speed_limit_rpm(),
-            warnings: warnings(status),
-            sensor_counter: self.counter,
+            warnings: warning::bits(&received, is_overspeed),
+            sensor_counter: self.reception.counter(),
+            bridge_on: self.supervisor.bridge_on() && input.bridge_on,
+            challenge: self.reception.challenge(),
         };
         (setpoint, actuation)
     }
 
-    /// The actuator frame. The safe state makes no further checks, so a wheel speed limit corrupted
-    /// in one channel must not be reported: the limit is the lower of both channels'.
+    /// The actuator frame. The safe state makes no further checks of memory that it reports, so a
+    /// wheel speed limit corrupted in one channel must not be reported: the limit is the lower of
+    /// both channels'.
     fn report(&mut self, own: &Actuation<T>, other: &Actuation<T>) -> (Actuation<T>, FrameBytes) {
         let limit_rpm = lower(own.wheel_speed_limit_rpm, other.wheel_speed_limit_rpm);
         let actuation = Actuation {
             wheel_speed_limit_rpm: limit_rpm,
+            bridge_on: own.bridge_on && other.bridge_on,
             ..*own
         };
         let signals = actuation.map(&|signal: T| signal.to_f64() as f32);
         (actuation, encode_actuation(&signals, &mut self.sender))
-    }
-}
-
-/// The bit of the tolerated event.
-fn warnings(status: Status) -> u16 {
-    match status {
-        Status::Ok => 0,
-        Status::OkSomeLost => Warning::FramesLost.bit(),
-        Status::NoNewData => Warning::FrameMissing.bit(),
-        Status::Error => Warning::FrameDamaged.bit(),
-        Status::Repeated => Warning::FrameRepeated.bit(),
-        Status::WrongSequence => Warning::FrameSequence.bit(),
     }
 }
 
@@ -150,8 +127,7 @@ impl<T: Real> ControlTask<T> {
     pub(super) fn new(scenario: &Scenario<T>, clock_hz: u32) -> Self {
         Self {
             channels: DualChannel::new(Channel {
-                receiver: Receiver::new(SENSOR_DATA_ID, MAX_DELTA_COUNTER),
-                counter: u8::MAX,
+                reception: Reception::new(),
                 measurement: None,
                 controller: Controller::new(scenario),
                 supervisor: Supervisor::new(scenario, clock_hz),
@@ -173,9 +149,11 @@ impl<T: Real> ControlTask<T> {
         let [(actuation, frame), (_, other_frame)] = self
             .channels
             .run_each(&pairs, |channel, (own, other)| channel.report(own, other));
+        let bridge_on = self.channels.run(|channel| channel.supervisor.bridge_on());
         self.frames_differed = differ(&frame, &other_frame);
         ControlOutput {
             setpoints: [setpoint_a, setpoint_b],
+            bridge_on,
             frame,
             actuation,
         }
@@ -197,6 +175,9 @@ fn lower<T: Real>(a: T, b: T) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dither::Waveform;
+    use crate::ecu_schedule::Table;
+    use crate::frame::{SENSOR_DATA_ID, encode_measurement};
     use crate::gate::Limits;
     use crate::parameter::ParameterSet;
     use crate::policy::Policy;
@@ -296,12 +277,42 @@ mod tests {
         }
     }
 
+    /// A schedule that both channels have with a zero at the speed, as after a wrong flash.
     #[test]
-    fn every_warning_has_a_name_of_its_own() {
-        for (k, warning) in Warning::ALL.into_iter().enumerate() {
-            assert!(!warning.name().is_empty());
-            let before = &Warning::ALL[..k];
-            assert!(before.iter().all(|other| other.name() != warning.name()));
+    fn a_schedule_without_dither_at_a_speed_is_found() {
+        for (waveform, start_ticks) in [(Waveform::Square, 0), (Waveform::Sine, 500)] {
+            let mut scenario = Scenario::<f32>::reconstruction();
+            scenario.dither.waveform = waveform;
+            scenario.dither.start_time_s = start_ticks as f32 / 1000.0;
+            let mut schedule = Table::of(waveform);
+            // 1750 and 1775 rpm, the neighbours of the speed.
+            schedule.amplitudes_v[30] = 0.0;
+            schedule.amplitudes_v[31] = 0.0;
+            let mut task = ControlTask::new(&scenario, CLOCK_HZ);
+            task.channels
+                .run(|one| one.controller = one.controller.with_schedule(schedule));
+            let mut sender = Sender::new(SENSOR_DATA_ID);
+            let (mut challenge, mut active_ticks) = (0, 0);
+            let found = (0..3000).find_map(|_| {
+                let measurement = Measurement {
+                    wheel_speed_rpm: 1760.0,
+                    yaw_rate_rad_per_s: 0.0,
+                    steering_angle_rad: 0.0,
+                    steering_rate_rad_per_s: 0.0,
+                    current_request_a: 0.0,
+                };
+                let output = task.run(&ControlInput {
+                    frame: Some(encode_measurement(&measurement, challenge, &mut sender)),
+                    elapsed_counts: 25_000,
+                    ..ControlInput::NOTHING
+                });
+                challenge = output.actuation.challenge;
+                active_ticks += u32::from(output.actuation.mode == Mode::Active);
+                let faults = Faults::from_bits(output.actuation.faults);
+                (!faults.is_empty()).then_some(faults)
+            });
+            assert_eq!(found, Some(Fault::DitherWeak.into()));
+            assert_eq!(active_ticks, start_ticks + 701, "0.7 s after the start");
         }
     }
 

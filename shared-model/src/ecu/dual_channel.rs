@@ -20,6 +20,11 @@ impl<C: Copy + PartialEq> DualChannel<C> {
         self.0[0] == self.0[1]
     }
 
+    /// Both channels, to read them.
+    pub fn get(&self) -> &[C; 2] {
+        &self.0
+    }
+
     /// Both channels.
     pub fn both(&mut self) -> &mut [C; 2] {
         &mut self.0

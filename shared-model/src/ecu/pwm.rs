@@ -14,6 +14,10 @@ pub struct PwmPeriod {
     pub duty: Duty,
     /// A control tick is due at its end.
     pub control_due: bool,
+    /// The servo's bridge is on in the period. It is off, until restart, from the period on in which
+    /// the duty on the pin differs from the commanded one or the channels differ, and after a fault
+    /// of the servo's path in the safe state. Without it no voltage is applied, whatever the duty.
+    pub bridge_on: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,6 +28,7 @@ struct Channel<T> {
     setpoint: Setpoint<T>,
     periods_per_tick: u32,
     periods_to_tick: u32,
+    bridge_on: bool,
 }
 
 impl<T: Real> Channel<T> {
@@ -39,7 +44,22 @@ impl<T: Real> Channel<T> {
         } else {
             self.periods_to_tick - 1
         };
-        PwmPeriod { duty, control_due }
+        self.bridge_on = self.has_bridge_on();
+        PwmPeriod {
+            duty,
+            control_due,
+            bridge_on: self.bridge_on,
+        }
+    }
+
+    #[inline(always)]
+    fn has_bridge_on(&self) -> bool {
+        self.bridge_on && !self.limiter.faults().contains(Fault::Readback)
+    }
+
+    fn accept(&mut self, setpoint: &Setpoint<T>, bridge_on: bool) {
+        self.setpoint = *setpoint;
+        self.bridge_on &= bridge_on;
     }
 }
 
@@ -66,6 +86,7 @@ impl<T: Real> PwmTask<T> {
                 setpoint: Setpoint::neutral(),
                 periods_per_tick,
                 periods_to_tick: periods_per_tick,
+                bridge_on: true,
             }),
             neutral,
             faults: Faults::NONE,
@@ -76,7 +97,7 @@ impl<T: Real> PwmTask<T> {
     pub fn begin(&mut self) -> PwmPeriod {
         let [a, b] = self.channels.both();
         let (a, b) = (a.begin(), b.begin());
-        self.faults.add_if(a != b, Fault::ChannelsDiffer);
+        self.note_channels(a == b);
         // Where the channels differ: of the two the duty nearer to neutral, and neutral itself if
         // they lie on both sides of it.
         let duty = self.neutral.median(a.duty, b.duty);
@@ -85,16 +106,32 @@ impl<T: Real> PwmTask<T> {
         PwmPeriod {
             duty,
             control_due: a.control_due || b.control_due,
+            bridge_on: a == b && a.bridge_on,
         }
+    }
+
+    /// Where the channels differ, memory was changed: the bridge is switched off.
+    #[inline(always)]
+    fn note_channels(&mut self, agree: bool) {
+        if !agree {
+            self.faults |= Fault::ChannelsDiffer;
+            self.channels.run(|channel| channel.bridge_on = false);
+        }
+    }
+
+    /// Whether the servo's bridge is on from the next period on. Both channels must agree to that.
+    pub fn bridge_on(&self) -> bool {
+        self.channels.get().iter().all(Channel::has_bridge_on)
     }
 
     /// Takes over what the control task computed in the last tick; for use where a control tick is
     /// due.
     pub fn accept(&mut self, output: &ControlOutput<T>) {
-        self.channels
-            .run_each(&output.setpoints, |channel, setpoint| {
-                channel.setpoint = *setpoint
-            });
+        let [a, b] = self.channels.both();
+        let [for_a, for_b] = &output.setpoints;
+        let [bridge_of_a, bridge_of_b] = output.bridge_on;
+        a.accept(for_a, bridge_of_a);
+        b.accept(for_b, bridge_of_b);
     }
 
     /// Reports that the control task was not finished when due again.
@@ -112,8 +149,7 @@ impl<T: Real> PwmTask<T> {
     // Out of line: nine periods in ten go without it.
     #[inline(never)]
     pub fn faults(&mut self) -> Faults {
-        self.faults
-            .add_if(!self.channels.agrees(), Fault::ChannelsDiffer);
+        self.note_channels(self.channels.agrees());
         for found in self.channels.run(|channel| channel.limiter.faults()) {
             self.faults |= found;
         }

@@ -40,6 +40,10 @@ listed! {
         Readback = 14 => "readback",
         /// The program's two channels differ, which indicates memory corruption.
         ChannelsDiffer = 15 => "channels differ",
+        /// Too many of the last sensor frames are missing, damaged or stale.
+        FramesInvalid = 16 => "frames invalid",
+        /// The dither is absent or too weak at a speed that needs it.
+        DitherWeak = 17 => "dither weak",
     }
 }
 
@@ -58,6 +62,17 @@ pub struct Faults(u32);
 impl Faults {
     /// No fault.
     pub const NONE: Self = Self(0);
+
+    /// The set of these faults.
+    pub const fn of<const COUNT: usize>(faults: [Fault; COUNT]) -> Self {
+        let mut bits = 0;
+        let mut rest: &[Fault] = &faults;
+        while let [first, others @ ..] = rest {
+            bits |= 1 << *first as u32;
+            rest = others;
+        }
+        Self(bits)
+    }
 
     /// The set with these bits.
     pub fn from_bits(bits: u32) -> Self {
@@ -84,6 +99,17 @@ impl Faults {
         Fault::ALL
             .into_iter()
             .filter(move |&fault| self.contains(fault))
+    }
+
+    /// A fault of the other set is in this set.
+    pub fn intersects(self, other: Self) -> bool {
+        self.0 & other.0 != 0
+    }
+
+    /// The faults of this set that are not in the other.
+    #[must_use]
+    pub fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
     }
 
     /// Puts the fault into the set if it was found.

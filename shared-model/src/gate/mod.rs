@@ -4,7 +4,8 @@
 //! At the control rate a [`Supervisor`] judges sensors, time and the controller's command; at the
 //! PWM rate a [`Limiter`] judges each sample of the dither and the duty seen on the servo's pin.
 //! Any fault latches the safe state until restart: the dither is ramped out, the motor's share
-//! slews to zero, and a lower wheel speed is demanded.
+//! slews to zero, and a lower wheel speed is demanded. The servo's path is judged in the safe state
+//! too: if the servo does not follow, or memory is corrupted, its bridge is switched off.
 
 mod fault;
 mod limiter;

@@ -40,6 +40,11 @@ impl<T: Real> Plausibility<T> {
         &self.limits
     }
 
+    /// The last wheel speed, rpm; `None` before the first measurement.
+    pub fn wheel_speed_rpm(&self) -> Option<T> {
+        self.last.map(|last| last.wheel_speed_rpm)
+    }
+
     /// A control tick; `measurement` is new, or `None` if there was none. Returns the faults found.
     pub fn check(&mut self, measurement: Option<&Measurement<T>>) -> Faults {
         self.ticks += T::one();
@@ -66,7 +71,7 @@ impl<T: Real> Plausibility<T> {
     fn is_in_range(&self, now: &Measurement<T>) -> bool {
         let limits = &self.limits;
         now.wheel_speed_rpm >= T::zero()
-            && now.wheel_speed_rpm <= limits.wheel_speed_rpm
+            && now.wheel_speed_rpm <= limits.wheel_speed_sensor_rpm
             && is_within(now.yaw_rate_rad_per_s, limits.yaw_rate_rad_per_s)
             && is_within(now.steering_angle_rad, limits.steering_angle_rad)
             && is_within(now.steering_rate_rad_per_s, limits.steering_rate_rad_per_s)

@@ -17,6 +17,9 @@ pub struct Observation<T> {
     pub elapsed_counts: u32,
     /// The measurement, if a valid frame brought a new one.
     pub measurement: Option<Measurement<T>>,
+    /// Its age by the challenge that its frame returned, control ticks, from 1; without a measurement
+    /// not used.
+    pub measurement_age_ticks: u32,
     /// The controller's command: the motor's share of the voltage, V.
     pub motor_v: T,
     /// The controller's command: the dither's amplitude, V.
@@ -26,6 +29,16 @@ pub struct Observation<T> {
     pub found_outside: Faults,
 }
 
+/// Faults after which the servo cannot be trusted to follow a ramp: its bridge is switched off.
+const BRIDGE_FAULTS: Faults = Faults::of([Fault::Readback, Fault::ChannelsDiffer]);
+/// Faults of the servo's path that are judged in the safe state too.
+const SERVO_FAULTS: Faults = Faults::of([
+    Fault::Readback,
+    Fault::ChannelsDiffer,
+    Fault::DitherAmplitude,
+    Fault::DitherFrequency,
+]);
+
 /// Greatest magnitudes of a command, rounding included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct CommandLimits<T> {
@@ -33,6 +46,52 @@ struct CommandLimits<T> {
     /// Change of the motor's share in a control tick.
     motor_change_v: T,
     dither_amplitude_v: T,
+}
+
+/// The least dither, above a wheel speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LeastDither<T> {
+    above_rpm: T,
+    amplitude_v: T,
+    /// Most consecutive control ticks with less.
+    max_weak_ticks: u32,
+    /// Control ticks until it applies.
+    ticks_to_start: u32,
+    /// Consecutive control ticks with less.
+    weak_ticks: u32,
+}
+
+impl<T: Real> LeastDither<T> {
+    fn new(scenario: &Scenario<T>) -> Self {
+        let limits = &scenario.gate;
+        let ticks = |time_s: T| (time_s * scenario.run.control_rate_hz + T::from_f64(0.5)).to_u32();
+        Self {
+            above_rpm: limits.dither_above_rpm,
+            amplitude_v: match scenario.dither.waveform {
+                Waveform::None => T::zero(),
+                Waveform::Square => limits.square_least_amplitude_v,
+                Waveform::Sine => limits.sine_least_amplitude_v,
+            },
+            max_weak_ticks: ticks(limits.weak_dither_s),
+            ticks_to_start: ticks(scenario.dither.start_time_s),
+            weak_ticks: 0,
+        }
+    }
+
+    /// A control tick of an active ECU; returns whether the dither has been too weak for too long.
+    fn is_missed(&mut self, wheel_speed_rpm: Option<T>, amplitude_v: T) -> bool {
+        if self.ticks_to_start > 0 {
+            self.ticks_to_start -= 1;
+            return false;
+        }
+        let is_needed = wheel_speed_rpm.is_some_and(|speed_rpm| speed_rpm > self.above_rpm);
+        self.weak_ticks = if is_needed && amplitude_v < self.amplitude_v {
+            self.weak_ticks.saturating_add(1)
+        } else {
+            0
+        };
+        self.weak_ticks > self.max_weak_ticks
+    }
 }
 
 /// The gate at the control rate.
@@ -47,9 +106,14 @@ pub struct Supervisor<T> {
     /// Least and most counts of the clock in a control tick.
     window_counts: (u32, u32),
     frame_age_ticks: u32,
-    ticks_since_frame: u32,
+    /// Age of the last measurement.
+    age_ticks: u32,
+    least_dither: LeastDither<T>,
     mode: Mode,
     faults: Faults,
+    /// Faults found outside so far.
+    found_outside: Faults,
+    bridge_on: bool,
     setpoint: Setpoint<T>,
 }
 
@@ -78,17 +142,20 @@ impl<T: Real> Supervisor<T> {
             slew_v,
             ramp_v: amplitude_limit_v * period_s / limits.ramp_out_s,
             window_counts: ((counts - tolerance).to_u32(), (counts + tolerance).to_u32()),
-            frame_age_ticks: (limits.frame_age_s * scenario.run.control_rate_hz + T::from_f64(0.5))
-                .to_u32(),
-            ticks_since_frame: 0,
+            frame_age_ticks: limits.frame_age_ticks(scenario.run.control_rate_hz),
+            age_ticks: 0,
+            least_dither: LeastDither::new(scenario),
             mode: Mode::Starting,
             faults: Faults::NONE,
+            found_outside: Faults::NONE,
+            bridge_on: true,
             setpoint: Setpoint::neutral(),
         }
     }
 
     /// A control tick: judges the observation, and passes a command within the limits.
     pub fn run(&mut self, seen: &Observation<T>) -> Setpoint<T> {
+        self.judge_bridge(seen.found_outside);
         // Findings after a fault are its consequences.
         if self.mode != Mode::Safe {
             let found = self.judge(seen);
@@ -106,6 +173,15 @@ impl<T: Real> Supervisor<T> {
         self.setpoint
     }
 
+    /// Switches the bridge off after a fault in which the servo may not follow its ramp to neutral,
+    /// and after any fault of its path that the safe state's ramp adds to those known before.
+    fn judge_bridge(&mut self, found_outside: Faults) {
+        let added = found_outside.without(self.found_outside);
+        let ramp_is_wrong = self.mode == Mode::Safe && added.intersects(SERVO_FAULTS);
+        self.bridge_on &= !(found_outside.intersects(BRIDGE_FAULTS) || ramp_is_wrong);
+        self.found_outside |= found_outside;
+    }
+
     fn next_mode(&self, has_measurement: bool) -> Mode {
         if !self.faults.is_empty() {
             Mode::Safe
@@ -120,17 +196,22 @@ impl<T: Real> Supervisor<T> {
         let mut faults = seen.found_outside;
         faults |= self.plausibility.check(seen.measurement.as_ref());
         faults |= self.command_faults(seen);
+        self.age_ticks = match seen.measurement {
+            Some(_) => seen.measurement_age_ticks,
+            None => self.age_ticks.saturating_add(1),
+        };
         // Before the first frame the times since the last tick and frame are undefined; until then
         // the servo is neutral.
         if self.mode == Mode::Starting {
             return faults;
         }
-        self.ticks_since_frame = match seen.measurement {
-            Some(_) => 0,
-            None => self.ticks_since_frame.saturating_add(1),
-        };
-        let is_old = self.ticks_since_frame > self.frame_age_ticks;
+        let is_old = self.age_ticks > self.frame_age_ticks;
         faults.add_if(is_old, Fault::FrameAge);
+        let speed_rpm = self.plausibility.wheel_speed_rpm();
+        let is_missed = self
+            .least_dither
+            .is_missed(speed_rpm, seen.dither_amplitude_v);
+        faults.add_if(is_missed, Fault::DitherWeak);
         let (least, most) = self.window_counts;
         let in_time = (least..=most).contains(&seen.elapsed_counts);
         faults.add_if(!in_time, Fault::TickWindow);
@@ -173,6 +254,21 @@ impl<T: Real> Supervisor<T> {
     /// The ECU's operating mode.
     pub fn mode(&self) -> Mode {
         self.mode
+    }
+
+    /// Greatest age of a measurement, control ticks.
+    pub fn frame_age_ticks(&self) -> u32 {
+        self.frame_age_ticks
+    }
+
+    /// Whether a measurement is above the greatest wheel speed of the vehicle.
+    pub fn is_overspeed(&self, measurement: &Measurement<T>) -> bool {
+        measurement.wheel_speed_rpm > self.plausibility.limits().wheel_speed_rpm
+    }
+
+    /// Whether the servo's bridge may be on. Once off, it is off until restart.
+    pub fn bridge_on(&self) -> bool {
+        self.bridge_on
     }
 
     /// The faults that caused the safe state.

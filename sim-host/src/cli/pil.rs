@@ -297,7 +297,7 @@ fn show(summaries: &[Summary], link: LinkKind) {
     );
     say!(
         "not compared: costs and times (the emulator counts instructions), the log, and the vehicle, which is the same code in all \
-         three; MIL has no frame checks and therefore no warnings"
+         three; of the frames MIL checks the freshness only, and therefore has other warnings"
     );
     say!(
         "PIL: {}",

@@ -6,7 +6,7 @@
 use super::{Board, BoardError, systick};
 use core::convert::Infallible;
 use core::ptr::{read_volatile, write_volatile};
-use core::sync::atomic::{AtomicBool, AtomicU16, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 use shared_model::diagnostic::ResetCause;
@@ -59,9 +59,9 @@ struct Registers {
     duty: AtomicU16,
     period: AtomicU16,
     /// The enable pin of the bridge.
-    bridge: AtomicBool,
-    /// The duty of period n at n modulo the length.
-    trace: [AtomicU16; TRACE_LEN as usize],
+    bridge: AtomicU32,
+    /// Duty and bridge of period n at n modulo the length.
+    trace: [AtomicU32; TRACE_LEN as usize],
 }
 
 // SAFETY: nothing else has this name.
@@ -70,8 +70,8 @@ static REGISTERS: Registers = Registers {
     periods: AtomicU32::new(0),
     duty: AtomicU16::new(0),
     period: AtomicU16::new(0),
-    bridge: AtomicBool::new(false),
-    trace: [const { AtomicU16::new(0) }; TRACE_LEN as usize],
+    bridge: AtomicU32::new(0),
+    trace: [const { AtomicU32::new(0) }; TRACE_LEN as usize],
 };
 
 /// The board.
@@ -99,7 +99,8 @@ impl SetDutyCycle for VirtualPwm {
             .periods
             .store(period.wrapping_add(1), Ordering::Relaxed);
         if let Some(place) = REGISTERS.trace.get((period % TRACE_LEN) as usize) {
-            place.store(duty, Ordering::Relaxed);
+            let bridge = REGISTERS.bridge.load(Ordering::Relaxed);
+            place.store(u32::from(duty) | bridge << 16, Ordering::Relaxed);
         }
         Ok(())
     }
@@ -114,12 +115,12 @@ impl digital::ErrorType for VirtualBridge {
 
 impl OutputPin for VirtualBridge {
     fn set_low(&mut self) -> Result<(), Infallible> {
-        REGISTERS.bridge.store(false, Ordering::Relaxed);
+        REGISTERS.bridge.store(0, Ordering::Relaxed);
         Ok(())
     }
 
     fn set_high(&mut self) -> Result<(), Infallible> {
-        REGISTERS.bridge.store(true, Ordering::Relaxed);
+        REGISTERS.bridge.store(1, Ordering::Relaxed);
         Ok(())
     }
 }
@@ -155,7 +156,7 @@ impl Board for Mps2 {
     }
 
     fn disable_bridge() {
-        REGISTERS.bridge.store(false, Ordering::Relaxed);
+        REGISTERS.bridge.store(0, Ordering::Relaxed);
     }
 
     fn neutralise_pwm() {

@@ -9,7 +9,7 @@ use shared_model::frame::decode_actuation;
 pub struct Comparison {
     /// Duty codes that were compared.
     pub duties: usize,
-    /// Duty codes that differ.
+    /// Duty codes that differ, or states of the bridge.
     pub different_duties: usize,
     /// Actuator frames that were compared.
     pub frames: usize,
@@ -33,8 +33,8 @@ impl Comparison {
 pub enum Depth {
     /// All.
     Bytes,
-    /// Mode, faults, voltages and speed limit: for an ECU without frame checks, which has no
-    /// warnings.
+    /// Mode, faults, voltages, speed limit and bridge: for an ECU without the end-to-end check, which
+    /// has other warnings.
     Commands,
 }
 
@@ -50,7 +50,7 @@ pub fn compare(a: &[Exchange], b: &[Exchange], depth: Depth) -> Comparison {
     };
     for (k, (a, b)) in a.iter().zip(b).enumerate() {
         let (a, b) = (&a.from_ecu, &b.from_ecu);
-        let duty_differs = a.duty_code != b.duty_code;
+        let duty_differs = (a.duty_code, a.bridge_on) != (b.duty_code, b.bridge_on);
         let frame_differs = !same_frame(a, b, depth);
         result.duties += 1;
         result.different_duties += usize::from(duty_differs);
@@ -72,6 +72,7 @@ fn same_frame(a: &Packet, b: &Packet, depth: Depth) -> bool {
             actuation.motor_voltage_v.to_bits(),
             actuation.dither_amplitude_v.to_bits(),
             actuation.wheel_speed_limit_rpm.to_bits(),
+            actuation.bridge_on,
         ))
     };
     match depth {

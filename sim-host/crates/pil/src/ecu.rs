@@ -1,17 +1,22 @@
 //! The ECU in the loop: model (MIL), software (SIL) or processor (PIL).
 
-use qemu::bus_session::BusSession;
+use qemu::bus_session::{BusSession, Period};
 use qemu::session::Session;
 use qemu::{Finished, RunError};
 use shared_model::bus::Message;
 use shared_model::controller::{Command, Controller};
 use shared_model::dither::Oscillator;
 use shared_model::e2e::Sender;
+use shared_model::e2e_state_machine::{ProfileStatus, State, StateMachine};
+use shared_model::ecu::Warning;
 use shared_model::exchange::{FrameBytes, Packet, ToEcu};
-use shared_model::frame::{ACTUATOR_DATA_ID, decode_measurement, encode_actuation};
-use shared_model::gate::{Limiter, Observation, Setpoint, Supervisor};
+use shared_model::frame::{
+    ACTUATOR_DATA_ID, SENSOR_STATE_MACHINE, challenge_echo, decode_measurement, encode_actuation,
+};
+use shared_model::freshness::Challenger;
+use shared_model::gate::{Fault, Limiter, Observation, Setpoint, Supervisor};
 use shared_model::servo::Pwm;
-use shared_model::signal::{Actuation, Measurement};
+use shared_model::signal::{Actuation, Measurement, Mode};
 use shared_model::{InvalidScenario, Real, Scenario, ecu};
 use std::collections::VecDeque;
 
@@ -33,21 +38,35 @@ fn counts_per_tick<T: Real>(scenario: &Scenario<T>) -> u32 {
 }
 
 /// Model in the loop: controller and gate are called directly, in one channel and one thread,
-/// without the ECU's tasks and without checks of the sensor frames. It verifies that tasks,
-/// channels and frames do not change the commands.
+/// without the ECU's tasks and without the end-to-end check of the sensor frames: every frame is
+/// taken as whole, and only its freshness is checked. It verifies that tasks, channels and frames do
+/// not change the commands.
 pub struct Model<T> {
     controller: Controller<T>,
     supervisor: Supervisor<T>,
     limiter: Limiter<T>,
     oscillator: Oscillator,
     pwm: Pwm<T>,
+    challenger: Challenger,
+    state_machine: StateMachine,
     measurement: Option<Measurement<T>>,
+    /// Counter of the last frame that was used.
+    counter: u8,
     now: Setpoint<T>,
-    next: Option<(Setpoint<T>, FrameBytes)>,
+    next: Option<Next<T>>,
+    bridge_on: bool,
     sender: Sender,
     counts_per_tick: u32,
     periods_per_tick: u32,
     periods: u32,
+}
+
+/// Result of a control tick, which takes effect from the next one on.
+#[derive(Clone, Copy)]
+struct Next<T> {
+    setpoint: Setpoint<T>,
+    bridge_on: bool,
+    frame: FrameBytes,
 }
 
 impl<T: Real> Model<T> {
@@ -64,9 +83,13 @@ impl<T: Real> Model<T> {
             limiter: Limiter::new(scenario, pwm.neutral().code()),
             oscillator: Oscillator::new(&scenario.dither, scenario.run.pwm_rate_hz),
             pwm,
+            challenger: Challenger::new(),
+            state_machine: StateMachine::new(SENSOR_STATE_MACHINE),
             measurement: None,
+            counter: u8::MAX,
             now: Setpoint::neutral(),
             next: None,
+            bridge_on: true,
             sender: Sender::new(ACTUATOR_DATA_ID),
             counts_per_tick: counts_per_tick(scenario),
             periods_per_tick: scenario.periods_per_tick(),
@@ -74,9 +97,23 @@ impl<T: Real> Model<T> {
         })
     }
 
-    fn tick(&mut self, frame: Option<FrameBytes>) -> (Setpoint<T>, FrameBytes) {
-        let new = frame.map(|frame| decode_measurement(&frame).map(&|x| T::from_f64(x.into())));
-        self.measurement = new.or(self.measurement);
+    fn tick(&mut self, frame: Option<FrameBytes>) -> Next<T> {
+        let age_ticks = frame
+            .and_then(|frame| self.challenger.age_ticks(challenge_echo(&frame)))
+            .filter(|&age_ticks| age_ticks <= self.supervisor.frame_age_ticks());
+        let status = match (frame, age_ticks) {
+            (None, _) => ProfileStatus::NoNewData,
+            (Some(_), None) => ProfileStatus::Error,
+            (Some(_), Some(_)) => ProfileStatus::Ok,
+        };
+        let state = self.state_machine.check(status);
+        let used = frame.filter(|_| age_ticks.is_some() && state == State::Valid);
+        let new = used.map(|frame| decode_measurement(&frame).map(&|x| T::from_f64(x.into())));
+        self.counter = used.map_or(self.counter, |[_, _, counter, ..]| counter);
+        let mut found_outside = self.limiter.faults();
+        let is_active = self.supervisor.mode() == Mode::Active;
+        found_outside.add_if(state == State::Invalid && is_active, Fault::FramesInvalid);
+        self.measurement = new.filter(Measurement::is_finite).or(self.measurement);
         let none = Command {
             motor_v: T::zero(),
             dither_amplitude_v: T::zero(),
@@ -87,20 +124,35 @@ impl<T: Real> Model<T> {
         let setpoint = self.supervisor.run(&Observation {
             elapsed_counts: self.counts_per_tick,
             measurement: new,
+            measurement_age_ticks: age_ticks.unwrap_or(0),
             motor_v: command.motor_v,
             dither_amplitude_v: command.dither_amplitude_v,
-            found_outside: self.limiter.faults(),
+            found_outside,
         });
+        let is_overspeed = new.is_some_and(|now| self.supervisor.is_overspeed(&now));
+        let warning = |warning: Warning, is_found| if is_found { warning.bit() } else { 0 };
         let actuation = Actuation {
             mode: self.supervisor.mode(),
             faults: self.supervisor.faults().bits(),
             motor_voltage_v: setpoint.motor_v.to_f64() as f32,
             dither_amplitude_v: setpoint.dither_amplitude_v.to_f64() as f32,
             wheel_speed_limit_rpm: self.supervisor.wheel_speed_limit_rpm().to_f64() as f32,
-            warnings: 0,
-            sensor_counter: frame.map_or(u8::MAX, |[_, _, counter, ..]| counter),
+            warnings: warning(Warning::FrameMissing, frame.is_none())
+                | warning(Warning::FrameStale, status == ProfileStatus::Error)
+                | warning(Warning::Overspeed, is_overspeed),
+            sensor_counter: self.counter,
+            bridge_on: self.supervisor.bridge_on() && self.has_bridge_on(),
+            challenge: self.challenger.challenge(),
         };
-        (setpoint, encode_actuation(&actuation, &mut self.sender))
+        Next {
+            setpoint,
+            bridge_on: self.supervisor.bridge_on(),
+            frame: encode_actuation(&actuation, &mut self.sender),
+        }
+    }
+
+    fn has_bridge_on(&self) -> bool {
+        self.bridge_on && !self.limiter.faults().contains(Fault::Readback)
     }
 }
 
@@ -112,12 +164,17 @@ impl<T: Real> Ecu for Model<T> {
         let dither_v = self.now.dither_amplitude_v * sample;
         let duty = self.pwm.duty(self.limiter.run(&self.now, dither_v));
         self.limiter.expect(duty.code());
+        self.bridge_on = self.has_bridge_on();
         let next = self.next.take_if(|_| is_tick);
         let reply = answer(&Packet {
             duty_code: duty.code(),
-            frame: next.map(|(_, frame)| frame),
+            bridge_on: self.bridge_on,
+            frame: next.map(|next| next.frame),
         });
-        self.now = next.map_or(self.now, |(setpoint, _)| setpoint);
+        if let Some(next) = next {
+            self.now = next.setpoint;
+            self.bridge_on &= next.bridge_on;
+        }
         self.limiter.observe(reply.duty_code);
         if is_tick {
             self.next = Some(self.tick(reply.frame));
@@ -205,12 +262,12 @@ impl Ecu for Processor {
 /// the bus once per control tick. The duty codes are read from the emulated PWM.
 pub struct OnBus {
     session: BusSession,
-    /// Duty codes that are not yet passed on: those of the tick, and perhaps of the next, because
+    /// PWM periods that are not yet passed on: those of the tick, and perhaps of the next, because
     /// the PWM interrupt preempts the control task.
-    duties: VecDeque<u16>,
+    periods: VecDeque<Period>,
     periods_per_tick: u32,
     /// PWM periods of the tick that are not yet passed on.
-    periods: u32,
+    periods_left: u32,
     /// The frame of the tick, due with its last duty.
     frame: Option<FrameBytes>,
 }
@@ -220,9 +277,9 @@ impl OnBus {
     pub fn new(session: BusSession, periods_per_tick: u32) -> Self {
         Self {
             session,
-            duties: VecDeque::new(),
+            periods: VecDeque::new(),
             periods_per_tick,
-            periods: 0,
+            periods_left: 0,
             frame: None,
         }
     }
@@ -243,18 +300,19 @@ impl OnBus {
 
 impl Ecu for OnBus {
     fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
-        if self.periods == 0 {
+        if self.periods_left == 0 {
             let tick = self.session.tick()?;
-            self.duties.extend(tick.duties);
+            self.periods.extend(tick.periods);
             self.frame = tick.frames.last().copied();
-            self.periods = self.periods_per_tick;
+            self.periods_left = self.periods_per_tick;
         }
         // A tick has all its periods; after a reset the first has fewer.
-        let duty_code = self.duties.pop_front().unwrap_or_default();
-        self.periods -= 1;
-        let is_last = self.periods == 0;
+        let period = self.periods.pop_front().unwrap_or_default();
+        self.periods_left -= 1;
+        let is_last = self.periods_left == 0;
         let reply = answer(&Packet {
-            duty_code,
+            duty_code: period.duty_code,
+            bridge_on: period.bridge_on,
             frame: self.frame.take_if(|_| is_last),
         });
         match reply.frame {

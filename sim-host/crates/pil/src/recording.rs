@@ -12,7 +12,7 @@ use shared_model::exchange::{PACKET_LEN, Packet, PacketBytes};
 use std::io::Write;
 
 /// First bytes of a recording.
-pub const MAGIC: &[u8; 8] = b"DSLOOP1\n";
+pub const MAGIC: &[u8; 8] = b"DSLOOP2\n";
 const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 const CHECKSUM_LEN: usize = 4;
 

@@ -13,13 +13,17 @@ use shared_model::Scenario;
 use shared_model::e2e::{Receiver, Sender, Status};
 use shared_model::exchange::{FrameBytes, Packet};
 use shared_model::frame::{
-    ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, decode_actuation, encode_measurement,
+    ACTUATOR_DATA_ID, MAX_DELTA_COUNTER, SENSOR_DATA_ID, SENSOR_STATE_MACHINE, decode_actuation,
+    encode_measurement,
 };
 use shared_model::servo::Duty;
 use shared_model::signal::Actuation;
 
-/// Control ticks of the lead-in after the slew.
+/// Control ticks of the lead-in beside the slew: until the ECU is active, and spare.
 const SPARE_TICKS: f64 = 20.0;
+/// The first of them, before the ECU uses a frame: one without an answer to its first frame, one that
+/// begins the communication, and all but the last of the good frames that it requires.
+const START_TICKS: u32 = 1 + SENSOR_STATE_MACHINE.min_ok_init as u32;
 
 /// Control ticks of the lead-in.
 fn lead_in_ticks(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u32 {
@@ -28,11 +32,11 @@ fn lead_in_ticks(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u32 {
     (slewing_s * scenario.run.control_rate_hz + SPARE_TICKS).ceil() as u32
 }
 
-/// The ECU's scenario: its dither starts later by the lead-in.
+/// The ECU's scenario: its dither starts later by the lead-in from the ECU's activation on.
 pub fn ecu_scenario(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Scenario<f32> {
     let mut own = *scenario;
-    let lead_in_ticks = f64::from(lead_in_ticks(scenario, manoeuvre));
-    own.dither.start_time_s += lead_in_ticks / scenario.run.control_rate_hz;
+    let active_ticks = lead_in_ticks(scenario, manoeuvre).saturating_sub(START_TICKS);
+    own.dither.start_time_s += f64::from(active_ticks) / scenario.run.control_rate_hz;
     own.map(&|value| value as f32)
 }
 
@@ -96,16 +100,25 @@ impl VehicleNode {
         // The duty of the servo's driver cannot exceed its period.
         let [driven, captured] =
             [codes.driven, codes.captured].map(|code| code.min(self.period_counts));
-        let duty = Duty::new(driven, self.period_counts).expect("clamped to the period above");
+        // Without the bridge no voltage is applied, whatever the pin shows.
+        let duty = if from_ecu.bridge_on {
+            Duty::new(driven, self.period_counts).expect("clamped to the period above")
+        } else {
+            self.plant.pwm().neutral()
+        };
         if self.has_begun() {
             self.plant.step(duty);
         }
         let frame = is_tick.then(|| {
             let measured = self.sensors.sample(&self.plant.truth());
-            encode_measurement(&disturbance.measurement(measured), &mut self.sender)
+            // The frame is sent now, however old its measurement is.
+            let challenge = self.actuation.map_or(0, |actuation| actuation.challenge);
+            let measurement = disturbance.measurement(measured);
+            encode_measurement(&measurement, challenge, &mut self.sender)
         });
         Packet {
             duty_code: captured,
+            bridge_on: from_ecu.bridge_on,
             frame: disturbance.sensor_frame(frame),
         }
     }

@@ -122,6 +122,21 @@ fn the_vehicle_is_held_until_the_request_is_reached() {
     );
 }
 
+/// A measurement of a slow sensor in a frame that is sent in time.
+#[test]
+fn a_delayed_measurement_is_not_a_stale_frame() {
+    for delay_ticks in [11, 40, 100] {
+        let (mut scenario, mut manoeuvre) = example("delay-2.toml");
+        scenario.run.duration_s = 2.0;
+        manoeuvre.sensors.delay_ticks = delay_ticks;
+        let run = drive(&scenario, &manoeuvre);
+        for actuation in run.actuations.iter().flatten() {
+            assert_eq!((actuation.mode, actuation.faults), (Mode::Active, 0));
+            assert_eq!(actuation.warnings, 0, "{delay_ticks} ticks");
+        }
+    }
+}
+
 /// MIL and SIL agree under noise, coarse sensors and delays, which change the inputs of the ECU.
 #[test]
 fn mil_and_sil_agree_with_any_sensors() {
@@ -141,7 +156,8 @@ fn mil_and_sil_agree_with_any_sensors() {
         };
         let model = drive_with(&mut Model::new(&own).expect("it is valid"));
         let software = drive_with(&mut Software::new(&own).expect("it is valid"));
-        let comparison = compare(&model, &software, Depth::Commands);
+        // The frames too: challenges, warnings, counters.
+        let comparison = compare(&model, &software, Depth::Bytes);
         assert!(comparison.is_equal(), "{file}: {comparison:?}");
         assert!(comparison.duties >= 60_000 && comparison.frames >= 6_000);
     }

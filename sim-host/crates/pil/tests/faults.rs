@@ -1,7 +1,9 @@
 //! Faults between vehicle and ECU and in the ECU's interrupts, with the ECU's program on the host.
 
 use pil::ecu::{Ecu, Software};
-use pil::fault::catalogue::{self, Class, Fault, Kind, SensorFailure, Signal};
+use pil::fault::catalogue::{
+    self, Class, Fault, Kind, LinkFailure, SensorFailure, ServoFailure, Signal,
+};
 use pil::fault::host::{FaultFree, inject};
 use pil::fault::injection::Injection;
 use pil::fault::injector::Injector;
@@ -13,8 +15,11 @@ use pil::fault::{manoeuvres, waivers};
 use pil::manoeuvre::Manoeuvre;
 use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use shared_model::Scenario;
+use shared_model::dither::Waveform;
 use shared_model::exchange::Packet;
-use shared_model::gate::Fault as GateFault;
+use shared_model::frame::decode_actuation;
+use shared_model::gate::{Fault as GateFault, Faults};
+use shared_model::signal::Mode;
 
 /// Settled under the dither.
 const TIME_S: f64 = 9.0;
@@ -99,8 +104,8 @@ fn nothing_is_detected_without_a_fault() {
     let mut vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
     let mut second = vehicle.clone();
     let mut injector = Injector::new(&scenario);
-    // After the first frames, during the start.
-    let first_tick = 10;
+    // After the start, in which the ECU is not active.
+    let first_tick = 15;
     let mut judge = Judge::new(scenario.periods_per_tick(), first_tick);
     for _ in 0..vehicle.total_periods() {
         let (mut a, mut b) = (None, None);
@@ -133,6 +138,7 @@ fn a_planted_undetected_fault_is_classified() {
     let mut vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
     let fault_free = Packet {
         duty_code: 1250,
+        bridge_on: true,
         frame: None,
     };
     vehicle.answer(&fault_free);
@@ -152,6 +158,124 @@ fn a_planted_undetected_fault_is_classified() {
     };
     judge.observe(&off, &fault_free, &vehicle);
     assert_eq!(judge.outcome(false).verdict, Verdict::Undetected);
+    // A bridge that is off without a report is one too.
+    let mut judge = Judge::new(scenario.periods_per_tick(), 0);
+    let off = Packet {
+        bridge_on: false,
+        ..fault_free
+    };
+    judge.observe(&off, &fault_free, &vehicle);
+    assert_eq!(judge.outcome(false).verdict, Verdict::Undetected);
+}
+
+/// At steady motion no value of an old frame is implausible: a stuck gateway, a growing delay and a
+/// lasting loss are found by the frames themselves.
+#[test]
+fn old_and_lost_frames_are_detected_at_steady_motion() {
+    use LinkFailure::{GrowingDelay, Replay, TwoOfThreeLost};
+    let frames_invalid = GateFault::FramesInvalid;
+    let frame_age = GateFault::FrameAge;
+    for rpm in [300.0, 1000.0] {
+        let mut scenario = Scenario::reconstruction();
+        scenario.dither.waveform = Waveform::Square;
+        scenario.run.duration_s = 4.0;
+        let manoeuvre = Manoeuvre::constant(rpm, 2.0);
+        let fault_free = FaultFree::run(&scenario, &manoeuvre, &[2.0]).expect("it is valid");
+        for (failure, found_by, latest) in [
+            (Replay { frames: 256 }, vec![frames_invalid, frame_age], 12),
+            (
+                GrowingDelay { interval_ticks: 8 },
+                vec![frame_age],
+                8 * 10 + 1,
+            ),
+            (TwoOfThreeLost, vec![frames_invalid], 20),
+        ] {
+            let fault = Fault {
+                kind: Kind::SensorLink(failure),
+                ticks: None,
+            };
+            let (faults, ticks) = first_safe_state(&scenario, &manoeuvre, fault);
+            assert!(
+                found_by.iter().any(|one| faults == (*one).into()),
+                "{fault} at {rpm} rpm: {faults:?}"
+            );
+            assert!(ticks <= latest, "{fault} at {rpm} rpm: {ticks} ticks");
+            let rows = inject(std::slice::from_ref(&fault_free), &[fault], || {});
+            let rows = rows.expect("it is not interrupted");
+            assert_eq!(rows[0].verdict, Verdict::Detected, "{:?}", rows[0]);
+        }
+    }
+}
+
+/// Faults of the safe state and the ticks to it, for a fault from 2 s on.
+fn first_safe_state(
+    scenario: &Scenario<f64>,
+    manoeuvre: &Manoeuvre,
+    fault: Fault,
+) -> (Faults, u32) {
+    let mut tasks = Tasks::new(&ecu_scenario(scenario, manoeuvre)).expect("it is valid");
+    let mut vehicle = VehicleNode::new(scenario, manoeuvre).expect("it is valid");
+    let mut injector = Injector::new(scenario);
+    let mut began = None;
+    for _ in 0..vehicle.total_periods() {
+        let is_tick = vehicle
+            .periods()
+            .is_multiple_of(scenario.periods_per_tick());
+        if began.is_none() && is_tick && vehicle.plant().time_s() >= 2.0 {
+            injector.begin(fault);
+            began = Some(vehicle.periods());
+        }
+        let mut faults = Faults::NONE;
+        tasks.period(&mut |sent| {
+            if let Some(actuation) = sent.frame.and_then(|frame| decode_actuation(&frame).ok()) {
+                faults = Faults::from_bits(actuation.faults);
+            }
+            vehicle.answer_through(&mut injector, sent)
+        });
+        if !faults.is_empty() {
+            let periods = vehicle.periods() - began.expect("no fault before");
+            // The frame reports it one tick later.
+            return (faults, periods / scenario.periods_per_tick() - 1);
+        }
+    }
+    panic!("{fault} is not found");
+}
+
+/// A servo whose pin sticks in the safe state: its bridge is switched off, and the current decays.
+#[test]
+fn a_servo_that_sticks_in_the_safe_state_loses_its_voltage() {
+    let (scenario, manoeuvre) = manoeuvre(CONSTANT_SPEED);
+    let mut tasks = Tasks::new(&ecu_scenario(&scenario, &manoeuvre)).expect("it is valid");
+    let mut vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
+    let mut injector = Injector::new(&scenario);
+    let lasting = |kind| Fault { kind, ticks: None };
+    let mut stage = 0;
+    let mut stuck_code = 0;
+    let mut last = None;
+    while vehicle.plant().time_s() < TIME_S + 1.0 {
+        let time_s = vehicle.plant().time_s();
+        if stage == 0 && time_s >= TIME_S {
+            injector.begin(lasting(Kind::SensorLink(LinkFailure::Loss)));
+            stage = 1;
+        }
+        if stage == 1 && time_s >= TIME_S + 0.1 {
+            assert!(vehicle.plant().motor_current_a() > 5.0);
+            injector.begin(lasting(Kind::Servo(ServoFailure::Stuck)));
+            stage = 2;
+        }
+        tasks.period(&mut |sent| {
+            last = Some(*sent);
+            let reply = vehicle.answer_through(&mut injector, sent);
+            stuck_code = reply.duty_code;
+            reply
+        });
+    }
+    let actuation = vehicle.actuation().expect("it reports");
+    assert_eq!(actuation.mode, Mode::Safe);
+    assert!(!actuation.bridge_on && !last.expect("a packet").bridge_on);
+    assert!(stuck_code > 1400, "the pin is stuck at {stuck_code}");
+    let current_a = vehicle.plant().motor_current_a();
+    assert!(current_a.abs() < 1e-6, "{current_a} A");
 }
 
 /// In the safe state the chaos returns, unless the vehicle slows down as demanded.

@@ -26,22 +26,32 @@ use tempfile::TempDir;
 
 /// The instruction at which the core stops; it does nothing.
 const STOP_AT: &str = "before_sensor_frame";
-/// Registers of virtual PWM and bridge: periods (4 bytes), duty, period, bridge (2 each), and the
-/// duties of the last periods (2 each).
+/// Registers of virtual PWM and bridge: periods (4 bytes), duty, period (2 each), bridge (4), and
+/// for each of the last periods duty and bridge (4).
 const REGISTERS: &str = "VIRTUAL_PWM";
-const TRACE_AT: usize = 10;
+const TRACE_AT: usize = 12;
 const TRACE_LEN: u32 = 128;
+const BRIDGE_ON: u32 = 1 << 16;
 /// The emulator's multiplexer holds the bytes that the UART has no room for, so that a packet
 /// arrives whole. No byte may be its escape character, so that is none.
 const NO_ESCAPE: &str = "0x1ff";
 /// Control ticks between two looks at the log.
 const LOG_TICKS: u32 = 50;
 
+/// A PWM period as its pins had it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Period {
+    /// Duty code.
+    pub duty_code: u16,
+    /// The bridge was on.
+    pub bridge_on: bool,
+}
+
 /// Outputs of a control tick.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Tick {
-    /// Duty codes of its PWM periods.
-    pub duties: Vec<u16>,
+    /// Its PWM periods.
+    pub periods: Vec<Period>,
     /// Actuator frames; one, if the ECU was not left to itself.
     pub frames: Vec<FrameBytes>,
     /// Diagnostic frames.
@@ -164,7 +174,7 @@ impl BusSession {
         }
         self.ticks += 1;
         let mut tick = self.received()?;
-        tick.duties = self.duties()?;
+        tick.periods = self.periods()?;
         Ok(tick)
     }
 
@@ -299,18 +309,23 @@ impl BusSession {
         })
     }
 
-    /// Duty codes of the PWM periods since the last call.
-    fn duties(&mut self) -> Result<Vec<u16>, RunError> {
-        let length = TRACE_AT + 2 * TRACE_LEN as usize;
+    /// PWM periods since the last call.
+    fn periods(&mut self) -> Result<Vec<Period>, RunError> {
+        let length = TRACE_AT + 4 * TRACE_LEN as usize;
         let bytes = self.gdb.read_memory(self.registers, length)?;
         let (periods, rest) = bytes.split_at(4);
         let periods = u32::from_le_bytes(periods.try_into().unwrap_or_default());
-        let (codes, _) = rest[TRACE_AT - 4..].as_chunks::<2>();
+        let (trace, _) = rest[TRACE_AT - 4..].as_chunks::<4>();
         let new = periods.wrapping_sub(self.periods).min(TRACE_LEN);
-        let duties = (periods.wrapping_sub(new)..periods)
-            .map(|period| u16::from_le_bytes(codes[(period % TRACE_LEN) as usize]));
+        let new = (periods.wrapping_sub(new)..periods).map(|period| {
+            let word = u32::from_le_bytes(trace[(period % TRACE_LEN) as usize]);
+            Period {
+                duty_code: word as u16,
+                bridge_on: word & BRIDGE_ON != 0,
+            }
+        });
         self.periods = periods;
-        Ok(duties.collect())
+        Ok(new.collect())
     }
 
     /// Messages that the emulator has sent so far.

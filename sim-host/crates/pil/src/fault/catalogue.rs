@@ -38,7 +38,7 @@ impl Signal {
     /// Greatest magnitude that the gate accepts, in the signal's unit.
     pub fn range(self, limits: &Limits<f64>) -> f64 {
         match self {
-            Self::WheelSpeed => limits.wheel_speed_rpm,
+            Self::WheelSpeed => limits.wheel_speed_sensor_rpm,
             Self::YawRate => limits.yaw_rate_rad_per_s,
             Self::SteeringAngle => limits.steering_angle_rad,
             Self::SteeringRate => limits.steering_rate_rad_per_s,
@@ -82,10 +82,22 @@ pub enum LinkFailure {
     Repetition,
     /// Frames are lost.
     Loss,
+    /// Of each three frames two are lost.
+    TwoOfThreeLost,
     /// Frames are late by this number of control ticks.
     Delay {
         /// Control ticks.
         ticks: usize,
+    },
+    /// Frames are ever later: by one more control tick after each interval of this number.
+    GrowingDelay {
+        /// Control ticks.
+        interval_ticks: usize,
+    },
+    /// The last frames before the fault in an endless loop.
+    Replay {
+        /// Number of frames.
+        frames: usize,
     },
     /// An old frame replaces the new one.
     Insertion {
@@ -178,8 +190,11 @@ impl Kind {
             Self::ActuatorLink(failure) => match failure {
                 LinkFailure::Corruption { .. } => "actuator frame corrupted",
                 LinkFailure::Repetition => "actuator frame repeated",
-                LinkFailure::Loss => "actuator frame lost",
-                LinkFailure::Delay { .. } => "actuator frame late",
+                LinkFailure::Loss | LinkFailure::TwoOfThreeLost => "actuator frame lost",
+                LinkFailure::Delay { .. } | LinkFailure::GrowingDelay { .. } => {
+                    "actuator frame late"
+                }
+                LinkFailure::Replay { .. } => "actuator frames replayed",
                 LinkFailure::Insertion { .. } => "actuator frame inserted",
                 LinkFailure::Masquerade => "actuator frame masqueraded",
                 LinkFailure::WrongSequence { .. } => "actuator frame out of sequence",
@@ -212,8 +227,9 @@ impl LinkFailure {
         match self {
             Self::Corruption { .. } => "sensor frame corrupted",
             Self::Repetition => "sensor frame repeated",
-            Self::Loss => "sensor frame lost",
-            Self::Delay { .. } => "sensor frame late",
+            Self::Loss | Self::TwoOfThreeLost => "sensor frame lost",
+            Self::Delay { .. } | Self::GrowingDelay { .. } => "sensor frame late",
+            Self::Replay { .. } => "sensor frames replayed",
             Self::Insertion { .. } => "sensor frame inserted",
             Self::Masquerade => "sensor frame masqueraded",
             Self::WrongSequence { .. } => "sensor frame out of sequence",
@@ -333,7 +349,16 @@ impl fmt::Display for LinkFailure {
             Self::Corruption { bit } => write!(f, "bit {bit} flipped"),
             Self::Repetition => write!(f, "repeated"),
             Self::Loss => write!(f, "lost"),
+            Self::TwoOfThreeLost => write!(f, "two of three lost"),
             Self::Delay { ticks } => write!(f, "late by {ticks}"),
+            Self::GrowingDelay { interval_ticks } => {
+                write!(
+                    f,
+                    "later by 1 after each {}",
+                    counted(interval_ticks, "tick")
+                )
+            }
+            Self::Replay { frames } => write!(f, "last {frames} in a loop"),
             Self::Insertion { age_ticks } => write!(f, "{} old", counted(age_ticks, "tick")),
             Self::Masquerade => write!(f, "of another sender"),
             Self::WrongSequence { ahead } => write!(f, "counter ahead by {ahead}"),
@@ -417,7 +442,10 @@ fn sensors() -> Vec<Fault> {
 }
 
 fn links() -> Vec<Fault> {
-    use LinkFailure::{Corruption, Delay, Insertion, Loss, Masquerade, Repetition, WrongSequence};
+    use LinkFailure::{
+        Corruption, Delay, GrowingDelay, Insertion, Loss, Masquerade, Repetition, Replay,
+        TwoOfThreeLost, WrongSequence,
+    };
     let brief = [1, 2, 3].map(Some);
     let mut faults = Vec::new();
     let mut add = |failure, ticks: &[Option<u32>]| {
@@ -433,9 +461,12 @@ fn links() -> Vec<Fault> {
     add(Repetition, &[Some(1), Some(5), None]);
     add(Loss, &brief);
     add(Loss, &[Some(8), Some(12), None]);
+    add(TwoOfThreeLost, &[None]);
     for ticks in [1, 3, 20] {
         add(Delay { ticks }, &[None]);
     }
+    add(GrowingDelay { interval_ticks: 8 }, &[None]);
+    add(Replay { frames: 256 }, &[None]);
     for age_ticks in [2, 50, 256] {
         add(Insertion { age_ticks }, &[Some(1)]);
     }

@@ -143,6 +143,8 @@ struct Link {
     seen: VecDeque<FrameBytes>,
     /// Delayed frames.
     late: VecDeque<FrameBytes>,
+    /// Frames since the fault began.
+    failed: usize,
 }
 
 impl Link {
@@ -152,6 +154,7 @@ impl Link {
             other_data_id,
             seen: VecDeque::new(),
             late: VecDeque::new(),
+            failed: 0,
         }
     }
 
@@ -167,6 +170,8 @@ impl Link {
 
     fn fail(&mut self, failure: LinkFailure, sent: Option<FrameBytes>) -> Option<FrameBytes> {
         let mut frame = sent?;
+        let number = self.failed;
+        self.failed += 1;
         match failure {
             LinkFailure::Corruption { bit } => {
                 frame[usize::from(bit) / 8 % FRAME_LEN] ^= 1 << (bit % 8);
@@ -174,10 +179,14 @@ impl Link {
             }
             LinkFailure::Repetition => self.seen.back().copied(),
             LinkFailure::Loss => None,
-            LinkFailure::Delay { ticks } => {
-                self.late.push_back(frame);
-                let is_over = self.late.len() > ticks;
-                is_over.then(|| self.late.pop_front()).flatten()
+            LinkFailure::TwoOfThreeLost => (number % 3 == 2).then_some(frame),
+            LinkFailure::Delay { ticks } => self.delay(frame, ticks),
+            LinkFailure::GrowingDelay { interval_ticks } => {
+                self.delay(frame, number / interval_ticks)
+            }
+            LinkFailure::Replay { frames } => {
+                let first = self.seen.len().checked_sub(frames)?;
+                self.seen.get(first + number % frames).copied()
             }
             LinkFailure::Insertion { age_ticks } => {
                 let index = self.seen.len().checked_sub(age_ticks)?;
@@ -189,6 +198,12 @@ impl Link {
                 Some(protected(frame, self.data_id, counter))
             }
         }
+    }
+
+    fn delay(&mut self, frame: FrameBytes, ticks: usize) -> Option<FrameBytes> {
+        self.late.push_back(frame);
+        let is_over = self.late.len() > ticks;
+        is_over.then(|| self.late.pop_front()).flatten()
     }
 }
 

@@ -3,19 +3,11 @@
 use crate::vehicle_node::VehicleNode;
 use serde::Serialize;
 use shared_model::e2e::Status;
+use shared_model::ecu::Warning;
 use shared_model::exchange::Packet;
 use shared_model::frame::decode_actuation;
 use shared_model::gate::Faults;
 use shared_model::signal::{Actuation, Mode};
-
-/// Names of the warnings in an actuator frame, by bit.
-const WARNINGS: [&str; 5] = [
-    "frame missing",
-    "frame damaged",
-    "frame repeated",
-    "frame sequence",
-    "frames lost",
-];
 
 /// The part of the loop that detected a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,9 +31,9 @@ impl Detector {
                 names.join(" + ")
             }
             Self::Warning(bits) => {
-                let set = WARNINGS.iter().enumerate();
-                let set = set.filter(|(bit, _)| bits & (1 << bit) != 0);
-                let names: Vec<_> = set.map(|(_, name)| *name).collect();
+                let set = Warning::ALL.into_iter();
+                let set = set.filter(|warning| bits & warning.bit() != 0);
+                let names: Vec<_> = set.map(Warning::name).collect();
                 format!("warning: {}", names.join(" + "))
             }
             Self::Vehicle(status) => format!("vehicle: {status:?}"),
@@ -74,6 +66,8 @@ pub enum Reaction {
     Restart,
     /// The firmware ended, its PWM neutral.
     Ended,
+    /// The ECU stopped sending: the vehicle has no further frames from it.
+    LinkLost,
 }
 
 impl Reaction {
@@ -85,6 +79,7 @@ impl Reaction {
             Self::SafeState => "safe state",
             Self::Restart => "restart",
             Self::Ended => "ended, neutral",
+            Self::LinkLost => "link lost",
         }
     }
 }
@@ -93,7 +88,8 @@ impl Reaction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// Detected: the servo was brought to neutral, or the ECU restarted.
+    /// Detected: the servo was brought to neutral, the ECU restarted, or the vehicle lost the link
+    /// to it.
     Detected,
     /// Detected, and the ECU continued.
     Tolerated,
@@ -171,7 +167,8 @@ impl Judge {
     /// Observes a completed PWM period: the ECU's packet, its packet in the fault-free run, and the
     /// vehicle.
     pub fn observe(&mut self, from_ecu: &Packet, fault_free: &Packet, vehicle: &VehicleNode) {
-        self.differs |= from_ecu.duty_code != fault_free.duty_code;
+        self.differs |= (from_ecu.duty_code, from_ecu.bridge_on)
+            != (fault_free.duty_code, fault_free.bridge_on);
         let (now, expected) = (actuation(from_ecu), actuation(fault_free));
         self.differs |= commands(now.as_ref()) != commands(expected.as_ref());
         let tick = vehicle.periods() / self.periods_per_tick;
@@ -220,19 +217,24 @@ impl Judge {
         self.detect(Detector::Firmware(exit_code), tick, Reaction::Ended);
     }
 
-    /// The ECU stopped sending: the vehicle misses its frames, and the servo keeps its last duty.
-    pub fn timed_out(&mut self) {
+    /// The ECU stopped sending, between two packets or within one: the servo keeps its last duty,
+    /// and the vehicle misses the frame of the next control tick and all later ones.
+    pub fn timed_out(&mut self, vehicle: &VehicleNode) {
+        let tick = vehicle.periods() / self.periods_per_tick + 1;
+        self.reaction = Reaction::None;
         self.detect(
             Detector::Vehicle(Status::NoNewData),
-            self.injected_tick + 1,
-            Reaction::Tolerated,
+            tick,
+            Reaction::LinkLost,
         );
     }
 
     /// The outcome; `is_value_corrupted` if a corrupted value is still in use.
     pub fn outcome(&self, is_value_corrupted: bool) -> Outcome {
         let verdict = match self.reaction {
-            Reaction::SafeState | Reaction::Restart | Reaction::Ended => Verdict::Detected,
+            Reaction::SafeState | Reaction::Restart | Reaction::Ended | Reaction::LinkLost => {
+                Verdict::Detected
+            }
             Reaction::Tolerated => Verdict::Tolerated,
             Reaction::None if self.differs || is_value_corrupted => Verdict::Undetected,
             Reaction::None => Verdict::NoEffect,
@@ -250,13 +252,14 @@ fn actuation(packet: &Packet) -> Option<Actuation<f32>> {
     decode_actuation(packet.frame.as_ref()?).ok()
 }
 
-fn commands(actuation: Option<&Actuation<f32>>) -> Option<(Mode, u32, u32, u32)> {
+fn commands(actuation: Option<&Actuation<f32>>) -> Option<(Mode, u32, u32, u32, bool)> {
     actuation.map(|actuation| {
         (
             actuation.mode,
             actuation.motor_voltage_v.to_bits(),
             actuation.dither_amplitude_v.to_bits(),
             actuation.wheel_speed_limit_rpm.to_bits(),
+            actuation.bridge_on,
         )
     })
 }

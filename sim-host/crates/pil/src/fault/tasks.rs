@@ -31,6 +31,7 @@ pub struct Tasks {
     counts: f64,
     counts_at_tick: f64,
     duty_code: u16,
+    bridge_on: bool,
     failure: Option<TimingFailure>,
 }
 
@@ -44,6 +45,7 @@ impl Tasks {
         Ok(Self {
             scenario: *scenario,
             duty_code: pwm.neutral().code(),
+            bridge_on: pwm.bridge_on(),
             pwm,
             control,
             output: None,
@@ -82,15 +84,15 @@ impl Tasks {
                 self.interrupt(&mut |sent| {
                     first = sent.frame;
                     Packet {
-                        duty_code: sent.duty_code,
                         frame: None,
+                        ..*sent
                     }
                 });
                 // The second call's duty overwrites the first's before the period is over.
                 self.interrupt(&mut |sent| {
                     answer(&Packet {
-                        duty_code: sent.duty_code,
                         frame: sent.frame.or(first),
+                        ..*sent
                     })
                 });
             }
@@ -102,6 +104,7 @@ impl Tasks {
     fn miss(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) {
         let reply = answer(&Packet {
             duty_code: self.duty_code,
+            bridge_on: self.bridge_on,
             frame: None,
         });
         self.frame = reply.frame.or(self.frame);
@@ -115,8 +118,10 @@ impl Tasks {
             self.pwm.accept(&output);
         }
         self.duty_code = period.duty.code();
+        self.bridge_on = period.bridge_on;
         let reply = answer(&Packet {
             duty_code: self.duty_code,
+            bridge_on: self.bridge_on,
             frame,
         });
         self.pwm.end(reply.duty_code);
@@ -132,6 +137,7 @@ impl Tasks {
             frame: self.frame.take(),
             elapsed_counts: (self.counts - self.counts_at_tick) as u32,
             found_by_pwm: self.pwm.faults(),
+            bridge_on: self.pwm.bridge_on(),
         };
         self.counts_at_tick = self.counts;
         if let Some(late) = &mut self.pending {

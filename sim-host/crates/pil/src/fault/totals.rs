@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 pub struct Total {
     /// All faults.
     pub injected: usize,
-    /// Detected: servo neutral, or the ECU restarted.
+    /// Detected: servo neutral, the ECU restarted, or its link is lost.
     pub detected: usize,
     /// Detected, and the ECU continued.
     pub tolerated: usize,

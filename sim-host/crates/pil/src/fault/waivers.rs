@@ -6,8 +6,8 @@ use super::injection::Injection;
 use super::processor_fault::{Action, ProcessorFault};
 
 /// Greatest step of the wheel speed that is plausible for a vehicle, as a share of its range: 20 of
-/// 2500 rpm.
-const WHEEL_SPEED_SHARE: f32 = 0.008;
+/// 4000 rpm.
+const WHEEL_SPEED_SHARE: f32 = 0.005;
 /// The same for a signal that does not enter a command.
 const MONITORED_SHARE: f32 = 0.03;
 /// First data address of every Cortex-M; code has lower addresses.

@@ -125,7 +125,7 @@ impl Bench {
                 time_out,
             };
             let done = scope.spawn(move || debugger.act(action, tick));
-            let session = Session::start(
+            let mut session = Session::start(
                 &self.target.image,
                 self.target.machine,
                 &settings::of(&self.ecu),
@@ -133,7 +133,9 @@ impl Bench {
                 &["-S", "-gdb", &at_gdb, "-qmp", &at_qmp],
                 time_out,
             )?;
-            let run = self.observe(session, tick);
+            let run = self.observe(tick, |answer| exchange(&mut session, answer));
+            // Ends the emulator, and with it the debugger's connection.
+            drop(session);
             // The socket closes with the emulator, so this thread ends too.
             let done = done.join().expect("the debugger does not panic");
             let run = run?;
@@ -145,34 +147,20 @@ impl Bench {
         })
     }
 
-    fn observe(&self, mut session: Session, tick: u32) -> Result<FaultyRun, RunError> {
+    fn observe(
+        &self,
+        tick: u32,
+        period: impl FnMut(&mut dyn FnMut(&Packet) -> Packet) -> Result<Packet, RunError>,
+    ) -> Result<FaultyRun, RunError> {
         let periods_per_tick = self.scenario.periods_per_tick();
-        let mut vehicle = self.vehicle.clone();
-        let mut judge = Judge::new(periods_per_tick, tick);
-        let mut packets = Vec::with_capacity(self.fault_free.len());
-        for fault_free in &self.fault_free {
-            match exchange(&mut session, &mut |from_ecu| vehicle.answer(from_ecu)) {
-                Ok(from_ecu) => {
-                    packets.push(from_ecu);
-                    if vehicle.periods() > tick * periods_per_tick {
-                        judge.observe(&from_ecu, fault_free, &vehicle);
-                    }
-                }
-                Err(RunError::LinkLost { exit_code, .. }) => {
-                    judge.ended(exit_code.unwrap_or(NO_EXIT_CODE), &vehicle);
-                    break;
-                }
-                Err(RunError::TimedOut { .. }) => {
-                    judge.timed_out();
-                    break;
-                }
-                Err(error) => return Err(error),
-            }
-        }
-        Ok(FaultyRun {
-            outcome: judge.outcome(false),
-            packets,
-        })
+        let judge = Judge::new(periods_per_tick, tick);
+        observe(
+            &self.fault_free,
+            self.vehicle.clone(),
+            judge,
+            tick * periods_per_tick,
+            period,
+        )
     }
 
     /// The greatest angles of the fault-free run from a tick on.
@@ -256,6 +244,41 @@ impl Bench {
     }
 }
 
+/// Runs a loop whose ECU may end or stop sending, and observes it after the PWM period `from`.
+fn observe(
+    fault_free: &[Packet],
+    mut vehicle: VehicleNode,
+    mut judge: Judge,
+    from: u32,
+    mut period: impl FnMut(&mut dyn FnMut(&Packet) -> Packet) -> Result<Packet, RunError>,
+) -> Result<FaultyRun, RunError> {
+    let mut packets = Vec::with_capacity(fault_free.len());
+    for fault_free in fault_free {
+        match period(&mut |from_ecu| vehicle.answer(from_ecu)) {
+            Ok(from_ecu) => {
+                packets.push(from_ecu);
+                if vehicle.periods() > from {
+                    judge.observe(&from_ecu, fault_free, &vehicle);
+                }
+            }
+            Err(RunError::LinkLost { exit_code, .. }) => {
+                judge.ended(exit_code.unwrap_or(NO_EXIT_CODE), &vehicle);
+                break;
+            }
+            // Also within a packet: the rest of it does not come.
+            Err(RunError::TimedOut { .. }) => {
+                judge.timed_out(&vehicle);
+                break;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(FaultyRun {
+        outcome: judge.outcome(false),
+        packets,
+    })
+}
+
 fn exchange(
     session: &mut Session,
     answer: &mut dyn FnMut(&Packet) -> Packet,
@@ -267,4 +290,72 @@ fn exchange(
         stop: false,
     })?;
     Ok(received.packet)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fault::judge::{Detector, Reaction, Verdict};
+    use shared_model::e2e::Status;
+    use std::time::Duration;
+
+    const TICK: u32 = BENCH_TICKS.start;
+
+    /// The outcome if the ECU's packet of one PWM period does not come, or only its first part.
+    fn outcome_without_packet(period: u32) -> Outcome {
+        let mut scenario = Scenario::reconstruction();
+        scenario.run.duration_s = BENCH_S;
+        let manoeuvre = Manoeuvre::constant(BENCH_RPM, BENCH_REQUEST_A);
+        let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
+        let ecu = ecu_scenario(&scenario, &manoeuvre);
+        let mut on_host = vehicle.clone();
+        let mut tasks = Tasks::new(&ecu).expect("it is valid");
+        let mut fault_free = Vec::new();
+        for _ in 0..vehicle.total_periods() {
+            tasks.period(&mut |from_ecu| {
+                fault_free.push(*from_ecu);
+                on_host.answer(from_ecu)
+            });
+        }
+        let judge = Judge::new(scenario.periods_per_tick(), TICK);
+        let mut tasks = Tasks::new(&ecu).expect("it is valid");
+        let mut periods = 0;
+        let run = observe(
+            &fault_free,
+            vehicle,
+            judge,
+            TICK * scenario.periods_per_tick(),
+            |answer| {
+                periods += 1;
+                if periods == period {
+                    // As the session reports a packet whose rest does not come.
+                    return Err(RunError::TimedOut {
+                        limit: Duration::from_secs(1),
+                        last_line: String::new(),
+                    });
+                }
+                let mut sent = None;
+                tasks.period(&mut |from_ecu| {
+                    sent = Some(*from_ecu);
+                    answer(from_ecu)
+                });
+                Ok(sent.expect("a duty in every period"))
+            },
+        );
+        run.expect("a lost link is an outcome").outcome
+    }
+
+    #[test]
+    fn an_ecu_that_stops_within_a_packet_is_detected() {
+        for (period, latency_ticks) in
+            [(10 * TICK + 1, 1), (10 * TICK + 10, 1), (10 * TICK + 11, 2)]
+        {
+            let outcome = outcome_without_packet(period);
+            assert_eq!(outcome.verdict, Verdict::Detected, "period {period}");
+            assert_eq!(outcome.reaction, Reaction::LinkLost);
+            let detection = outcome.detection.expect("it was detected");
+            assert_eq!(detection.detector, Detector::Vehicle(Status::NoNewData));
+            assert_eq!(detection.latency_ticks, latency_ticks, "period {period}");
+        }
+    }
 }
