@@ -150,9 +150,10 @@ fn no_breakpoint_is_in_the_product() {
     }
 }
 
-/// Until the dither has come in.
+/// The lead-in and a fifth of a second, with the dither from the start: a debugger's stop costs the
+/// emulator some milliseconds.
 #[test]
-fn every_manoeuvre_gives_the_host_s_commands_over_the_bus() {
+fn every_manoeuvre_gives_the_commands_of_the_host_over_the_bus() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/manoeuvres");
     let mut files = 0;
     for entry in std::fs::read_dir(folder).expect("it is there").flatten() {
@@ -160,7 +161,8 @@ fn every_manoeuvre_gives_the_host_s_commands_over_the_bus() {
             continue;
         }
         let (mut scenario, manoeuvre) = load(&entry.path()).expect("the example is valid");
-        scenario.run.duration_s = 4.0;
+        scenario.run.duration_s = 0.2;
+        scenario.dither.start_time_s = 0.0;
         let target = Target {
             image: image("ecu"),
             machine: MACHINE,
@@ -170,9 +172,9 @@ fn every_manoeuvre_gives_the_host_s_commands_over_the_bus() {
         let runs = run_all(&scenario, &manoeuvre, &target, || {});
         let runs = runs.unwrap_or_else(|error| panic!("{}: {error}", manoeuvre.name));
         assert!(runs.agree(), "{}: {:?}", runs.name, runs.software_processor);
-        assert!(runs.software_processor.duties >= 40_000);
-        assert!(runs.software_processor.frames >= 3_999);
-        println!("{}: {:.1} times real time", runs.name, runs.speed());
+        assert!(runs.software_processor.duties >= 2000);
+        assert!(runs.software_processor.frames >= 199);
+        println!("{}: {:.2} times real time", runs.name, runs.speed());
         files += 1;
     }
     assert!(files >= 8, "{files} manoeuvres");
@@ -241,7 +243,7 @@ fn bad_configurations_are_refused_by_name_with_the_servo_neutral() {
         assert_eq!(configuration_code(&mut session), code, "{name}");
         let servo = session.servo().expect("it can be read");
         assert!(is_neutral(servo), "{name}: {servo:?}");
-        let log = session.finish().expect("it has a log").join("\n");
+        let log = session.log().expect("it has a log").join("\n");
         assert!(log.contains("configuration refused"), "{name}: {log}");
     }
 }

@@ -24,7 +24,7 @@ const GROUPS: [Group; 4] = [
             ),
             (
                 "firmware",
-                "an image: size and stack, run in QEMU, decoded telemetry",
+                "an image: configure, size and stack, run, telemetry",
             ),
         ],
     ),

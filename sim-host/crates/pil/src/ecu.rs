@@ -293,8 +293,8 @@ impl OnBus {
     ///
     /// # Errors
     /// If the emulator does not answer.
-    pub fn finish(self) -> Result<Vec<String>, RunError> {
-        self.session.finish()
+    pub fn finish(mut self) -> Result<Vec<String>, RunError> {
+        self.session.log()
     }
 }
 

@@ -286,11 +286,11 @@ impl BusSession {
         &mut self.gdb
     }
 
-    /// Ends the emulator and returns the log.
+    /// Lines of the log since the last call; at most the last thousand.
     ///
     /// # Errors
     /// If the stub does not answer.
-    pub fn finish(mut self) -> Result<Vec<String>, RunError> {
+    pub fn log(&mut self) -> Result<Vec<String>, RunError> {
         self.read_log()?;
         Ok(std::mem::take(&mut self.log).into_vec())
     }

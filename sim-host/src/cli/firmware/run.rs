@@ -5,13 +5,17 @@ use crate::cli::outcome::Outcome;
 use crate::cli::output::check;
 use anyhow::{Context, anyhow, ensure};
 use dynamics::config;
+use image::Image;
 use qemu::Machine;
+use qemu::bus_session::BusSession;
+use qemu::configured::place;
 use qemu::log::LogDecoder;
 use qemu::telemetry::Recording;
 use shared_model::Scenario;
+use shared_model::diagnostic::{Diagnostic, decode_diagnostic};
 use shared_model::settings::SettingError;
 use std::path::{Path, PathBuf};
-use std::time::SystemTime;
+use std::time::{Duration, Instant, SystemTime};
 use toml::{Table, Value};
 
 /// Run a firmware image in QEMU, print its log, and return its exit code.
@@ -27,7 +31,8 @@ use toml::{Table, Value};
 
 Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME and telemetry=FILE.
 Exit codes are the firmware's: 0 complete, confirmed by log and telemetry; 10 scenario rejected, 11 telemetry, 12 overrun, 13 panic,
-14 hard fault, 15 watchdog, 16 unexpected interrupt. The exit code is 2 if the image could not be run or did not end in time."
+14 hard fault, 15 watchdog, 16 unexpected interrupt. The exit code is 2 if the image could not be run or did not end in time.
+The image `ecu` takes no settings and does not end: its log and its status are printed until --time-out or Ctrl-C."
 )]
 pub struct Arguments {
     /// Machine to emulate
@@ -67,6 +72,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
             }
         );
     }
+    if place(&image).is_some() {
+        return run_alone(&image, arguments, time_out);
+    }
     check_destination(arguments)?;
     let before = telemetry(arguments).and_then(written);
     let show = |line: &str| say!("{line}");
@@ -91,6 +99,45 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Code(
         u8::try_from(code).unwrap_or(crate::cli::outcome::COULD_NOT_RUN),
     ))
+}
+
+/// Runs the product's image without a vehicle, until the time limit or Ctrl-C, and prints its log and
+/// its status.
+fn run_alone(image: &Image, arguments: &Arguments, limit: Duration) -> anyhow::Result<Outcome> {
+    /// Time between two looks at the log.
+    const LOOK: Duration = Duration::from_millis(200);
+    ensure!(
+        arguments.settings.is_empty(),
+        "setting {}: the image `ecu` has its settings in flash; write them with `sim-host firmware configure`",
+        arguments.settings[0]
+    );
+    let mut session = BusSession::start(image, arguments.machine, limit)?;
+    let mut shown = None;
+    let start = Instant::now();
+    while start.elapsed() < limit && !interrupt::requested() {
+        let received = session.run_freely(LOOK)?;
+        for line in session.log()? {
+            say!("{line}");
+        }
+        let diagnostics = received.diagnostics.iter();
+        for diagnostic in diagnostics.filter_map(decode_diagnostic) {
+            if let Diagnostic::Status {
+                configuration,
+                starts,
+                faults_in_a_row,
+                ..
+            } = diagnostic
+            {
+                let status = (configuration, starts, faults_in_a_row);
+                if shown.replace(status) != Some(status) {
+                    say!(
+                        "status: start {starts}, configuration {configuration}, faults in a row {faults_in_a_row}"
+                    );
+                }
+            }
+        }
+    }
+    Ok(Outcome::Success)
 }
 
 /// Rejects settings that the firmware would reject, before it is started.
