@@ -431,3 +431,14 @@ fn a_log_that_nobody_reads_stops_nothing() {
     assert_eq!(run.actuation().mode, Mode::Safe);
     run.ticks(100, without_frame);
 }
+
+#[test]
+fn a_debugger_that_detaches_leaves_the_ecu_running() {
+    let mut session = start(&product(&ecu()));
+    for _ in 0..20 {
+        session.tick().expect("it runs");
+    }
+    let received = session.run_detached(Duration::from_millis(300));
+    let frames = received.expect("it runs on").frames;
+    assert!(frames.len() > 50, "{} frames", frames.len());
+}

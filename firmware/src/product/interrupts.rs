@@ -7,6 +7,7 @@ use crate::board::{Board, Current};
 use crate::{clock, steering, tasks};
 use core::arch::naked_asm;
 use core::cell::Cell;
+use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use critical_section::Mutex;
 use shared_model::bus::{Bus, Message, SerialBus, latest};
@@ -60,7 +61,7 @@ impl PwmInterrupt {
 impl ControlInterrupt {
     fn run(&mut self) {
         self.send();
-        before_sensor_frame();
+        before_sensor_frame(&raw mut MARK);
         let frame = latest(&mut self.bus, Message::Sensor);
         let output = self
             .steering
@@ -84,13 +85,21 @@ impl ControlInterrupt {
     }
 }
 
-/// The place at which a debugger that plays the vehicle stops: after the duties and frames of a
-/// tick, and before its input is taken. It continues after the first instruction, which does nothing.
-// SAFETY: does nothing, and nothing else has this name.
+/// Written by each control tick after its duties and frames, and before its input is taken: a
+/// debugger that plays the vehicle watches it. Not zeroed by the start-up code, which would be a
+/// write, too.
+#[unsafe(link_section = ".uninit.mark")]
+// SAFETY: nothing else has this name.
+#[unsafe(export_name = "BEFORE_SENSOR_FRAME")]
+static mut MARK: MaybeUninit<u32> = MaybeUninit::uninit();
+
+/// Writes the mark with its first instruction, of two bytes, which the debugger then skips: the
+/// emulator would stop at it again.
+// SAFETY: nothing else has this name; only the control task writes the mark, and nothing reads it.
 #[unsafe(naked)]
 #[unsafe(no_mangle)]
-extern "C" fn before_sensor_frame() {
-    naked_asm!("nop", "bx lr")
+extern "C" fn before_sensor_frame(mark: *mut MaybeUninit<u32>) {
+    naked_asm!("str r0, [r0]", "bx lr")
 }
 
 /// Faults of the gate in the last control tick, one bit each.

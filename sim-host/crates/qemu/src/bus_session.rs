@@ -24,8 +24,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-/// The instruction at which the core stops; it does nothing.
-const STOP_AT: &str = "before_sensor_frame";
+/// The variable whose write stops the core, and the instruction that writes it.
+const MARK: &str = "BEFORE_SENSOR_FRAME";
+const WRITE: &str = "before_sensor_frame";
 /// Registers of virtual PWM and bridge: periods (4 bytes), duty, period (2 each), bridge (4), and
 /// for each of the last periods duty and bridge (4).
 const REGISTERS: &str = "VIRTUAL_PWM";
@@ -76,11 +77,11 @@ pub struct BusSession {
     from_ecu: File,
     to_ecu: File,
     deframer: Deframer,
-    stop_at: u32,
+    mark: u32,
+    write: u32,
     registers: u32,
     periods: u32,
     ticks: u32,
-    is_at_stop: bool,
     channel: Option<Channel>,
     decoder: LogDecoder,
     stream: Stream,
@@ -102,7 +103,8 @@ impl BusSession {
         let path = |name: &str| directory.path().join(name);
         let decoder = LogDecoder::new(image)?;
         let symbol = |name| image.address_of(name).ok_or(RunError::NoSymbol { name });
-        let (stop_at, registers) = (symbol(STOP_AT)?, symbol(REGISTERS)?);
+        let (mark, write) = (symbol(MARK)?, symbol(WRITE)?);
+        let registers = symbol(REGISTERS)?;
         // Its bytes may not be those of its file: a configuration is written into them.
         let elf = path("ecu.elf");
         std::fs::write(&elf, &image.bytes).map_err(RunError::NotStarted)?;
@@ -130,18 +132,18 @@ impl BusSession {
             Ok(connected) => connected,
             Err(error) => return Err(reason(&mut emulator, error)),
         };
-        gdb.set_breakpoint(stop_at)?;
+        gdb.watch(mark)?;
         Ok(Self {
             gdb,
             qmp,
             from_ecu,
             to_ecu,
             deframer: Deframer::new(),
-            stop_at,
+            mark,
+            write,
             registers,
             periods: 0,
             ticks: 0,
-            is_at_stop: false,
             channel: Channel::of(image),
             decoder,
             stream: Stream::default(),
@@ -158,22 +160,20 @@ impl BusSession {
     /// # Errors
     /// If there is no such tick within the limit: the ECU is in a safe state without tasks.
     pub fn tick(&mut self) -> Result<Tick, RunError> {
-        let stop = if self.is_at_stop {
-            self.gdb.run_on_from(self.stop_at, self.limit)?
-        } else {
-            self.gdb.run_to_stop(self.limit)?
-        };
+        let stop = self.gdb.go_on(self.limit)?;
+        if stop == Stop::Breakpoint && self.gdb.read_register(Register::Pc)? == self.write {
+            self.gdb.write_register(Register::Pc, self.write + 2)?;
+        }
         if stop != Stop::Breakpoint {
             return Err(RunError::NotComplete {
                 last_line: self.log.last(),
             });
         }
-        self.is_at_stop = true;
         if self.ticks.is_multiple_of(LOG_TICKS) {
             self.read_log()?;
         }
         self.ticks += 1;
-        let mut tick = self.received()?;
+        let mut tick = received(&mut self.from_ecu, &mut self.deframer)?;
         tick.periods = self.periods()?;
         Ok(tick)
     }
@@ -184,12 +184,30 @@ impl BusSession {
     /// # Errors
     /// If the emulator fails.
     pub fn run_freely(&mut self, duration: Duration) -> Result<Tick, RunError> {
-        self.gdb.remove_breakpoint(self.stop_at)?;
+        self.gdb.unwatch(self.mark)?;
         self.gdb.run_for(duration, self.limit)?;
-        self.gdb.set_breakpoint(self.stop_at)?;
-        self.is_at_stop = false;
+        self.gdb.watch(self.mark)?;
         self.read_log()?;
-        self.received()
+        received(&mut self.from_ecu, &mut self.deframer)
+    }
+
+    /// Takes the debugger off, lets the ECU run for about `duration` of the host's time, and returns
+    /// what it sent.
+    ///
+    /// # Errors
+    /// If the stub does not answer.
+    pub fn run_detached(self, duration: Duration) -> Result<Tick, RunError> {
+        let Self {
+            gdb,
+            mut from_ecu,
+            mut deframer,
+            _emulator,
+            _directory,
+            ..
+        } = self;
+        gdb.detach()?;
+        std::thread::sleep(duration);
+        received(&mut from_ecu, &mut deframer)
     }
 
     /// Resets the machine; its RAM stays.
@@ -198,7 +216,6 @@ impl BusSession {
     /// If the emulator does not answer.
     pub fn reset(&mut self) -> Result<(), RunError> {
         self.qmp.execute("system_reset", json!({}))?;
-        self.is_at_stop = false;
         self.periods = 0;
         Ok(())
     }
@@ -266,7 +283,6 @@ impl BusSession {
     /// If the stub does not answer.
     pub fn jump_to(&mut self, address: u32) -> Result<(), RunError> {
         self.gdb.write_register(Register::Pc, address)?;
-        self.is_at_stop = false;
         Ok(())
     }
 
@@ -328,30 +344,6 @@ impl BusSession {
         Ok(new.collect())
     }
 
-    /// Messages that the emulator has sent so far.
-    fn received(&mut self) -> Result<Tick, RunError> {
-        let mut tick = Tick::default();
-        let mut buffer = [0; 256];
-        loop {
-            let length = match self.from_ecu.read(&mut buffer) {
-                Ok(0) => return Ok(tick),
-                Ok(length) => length,
-                Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(tick),
-                Err(error) => return Err(RunError::NotStarted(error)),
-            };
-            for &byte in &buffer[..length] {
-                let Received::Body(body) = self.deframer.push(byte) else {
-                    continue;
-                };
-                match bus::unpack(body) {
-                    Some((Message::Actuator, frame)) => tick.frames.push(frame),
-                    Some((Message::Diagnostic, frame)) => tick.diagnostics.push(frame),
-                    _ => {}
-                }
-            }
-        }
-    }
-
     fn read_log(&mut self) -> Result<(), RunError> {
         if let Some(channel) = self.channel {
             let bytes = channel.take(&mut self.gdb)?;
@@ -360,6 +352,30 @@ impl BusSession {
                 .decode_some(&mut self.stream, &bytes, |line| log.push(line));
         }
         Ok(())
+    }
+}
+
+/// Messages that the emulator has sent so far.
+fn received(from_ecu: &mut File, deframer: &mut Deframer) -> Result<Tick, RunError> {
+    let mut tick = Tick::default();
+    let mut buffer = [0; 256];
+    loop {
+        let length = match from_ecu.read(&mut buffer) {
+            Ok(0) => return Ok(tick),
+            Ok(length) => length,
+            Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(tick),
+            Err(error) => return Err(RunError::NotStarted(error)),
+        };
+        for &byte in &buffer[..length] {
+            let Received::Body(body) = deframer.push(byte) else {
+                continue;
+            };
+            match bus::unpack(body) {
+                Some((Message::Actuator, frame)) => tick.frames.push(frame),
+                Some((Message::Diagnostic, frame)) => tick.diagnostics.push(frame),
+                _ => {}
+            }
+        }
     }
 }
 

@@ -123,14 +123,29 @@ impl Gdb {
         self.go("c", limit)
     }
 
-    /// As [`run_to_stop`](Self::run_to_stop), for a core at the breakpoint `here` on an instruction
-    /// of two bytes that does nothing: it is skipped. A step over it would make the emulator
-    /// translate the whole program anew.
+    /// Stops the core after each write to the word at `address`.
+    ///
+    /// After a breakpoint the emulator translates the whole program anew; after this it does not.
+    ///
+    /// # Errors
+    /// If the stub rejects the request or does not answer.
+    pub(crate) fn watch(&mut self, address: u32) -> Result<(), SocketError> {
+        self.acknowledged(&format!("Z2,{address:x},4"))
+    }
+
+    /// Removes what [`watch`](Self::watch) has set.
+    ///
+    /// # Errors
+    /// If the stub rejects the request or does not answer.
+    pub(crate) fn unwatch(&mut self, address: u32) -> Result<(), SocketError> {
+        self.acknowledged(&format!("z2,{address:x},4"))
+    }
+
+    /// As [`run_to_stop`](Self::run_to_stop), for a core that is at no breakpoint.
     ///
     /// # Errors
     /// As [`run_to_stop`](Self::run_to_stop).
-    pub(crate) fn run_on_from(&mut self, here: u32, limit: Duration) -> Result<Stop, SocketError> {
-        self.write_register(Register::Pc, here + 2)?;
+    pub(crate) fn go_on(&mut self, limit: Duration) -> Result<Stop, SocketError> {
         self.go("c", limit)
     }
 

@@ -30,7 +30,8 @@ use std::path::{Path, PathBuf};
   sim-host firmware configure --config vehicle.toml --calibrate --out ecu.hex ecu-vehicle.elf
 
 The format follows from the name of the output: .bin (from the first address, gaps as erased flash), .hex (Intel HEX), else ELF.
-Without --config the parameters are the preset's, and the dither may start at once: its start time is 0.")]
+Without --config the parameters are the preset's. The start time of the dither is 0 in the image: that of the paper belongs to its
+experiment.")]
 pub struct Arguments {
     /// TOML file with parameters that replace the preset's
     #[arg(long, value_name = "FILE", conflicts_with = "show")]
@@ -115,12 +116,15 @@ impl Arguments {
     fn scenario(&self, flash: &[u8]) -> anyhow::Result<Scenario<f32>> {
         let mut scenario = match &self.config {
             Some(file) => load_file(file, None)?,
-            None => {
-                let mut scenario = over_preset(toml::Table::new(), None)?;
-                scenario.dither.start_time_s = 0.0;
-                scenario
-            }
+            None => over_preset(toml::Table::new(), None)?,
         };
+        if scenario.dither.start_time_s != 0.0 {
+            eprintln!(
+                "note: dither.start_time_s = {} belongs to the experiment; the image gets 0, and its dither starts as soon as the speed demands it",
+                scenario.dither.start_time_s
+            );
+            scenario.dither.start_time_s = 0.0;
+        }
         scenario.servo.timer_clock_hz = self.timer_clock_hz();
         let mut own = scenario.map(&|value| value as f32);
         if !self.calibrate {
