@@ -70,7 +70,7 @@ pub struct Config {
 ///
 /// ```
 /// use shared_model::e2e_state_machine::{Config, ProfileStatus, State, StateMachine};
-/// let mut machine = StateMachine::new(Config {
+/// let config = Config {
 ///     window_size: 3,
 ///     min_ok_init: 2,
 ///     max_error_init: 1,
@@ -78,17 +78,16 @@ pub struct Config {
 ///     max_error_valid: 0,
 ///     min_ok_invalid: 3,
 ///     max_error_invalid: 0,
-/// });
+/// };
+/// let mut machine = StateMachine::new();
 /// use ProfileStatus::{Error, NoNewData, Ok};
-/// let states = [NoNewData, Ok, Ok, Ok, Error, Ok, Ok, Ok].map(|status| machine.check(status));
+/// let states = [NoNewData, Ok, Ok, Ok, Error, Ok, Ok, Ok];
+/// let states = states.map(|status| machine.check(&config, status));
 /// use State::{Init, Invalid, NoData, Valid};
 /// assert_eq!(states, [NoData, Init, Init, Valid, Invalid, Invalid, Invalid, Valid]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StateMachine {
-    config: Config,
-    /// One bit for each place of the window.
-    window: u32,
     /// The good statuses of the window, one bit each, the last in the lowest bit. A status that is
     /// neither good nor an error is in neither word, like a place not filled yet.
     ok: u32,
@@ -99,10 +98,8 @@ pub struct StateMachine {
 
 impl StateMachine {
     /// In NODATA.
-    pub const fn new(config: Config) -> Self {
+    pub const fn new() -> Self {
         Self {
-            config,
-            window: u32::MAX.wrapping_shr(u32::BITS.wrapping_sub(config.window_size as u32)),
             ok: 0,
             error: 0,
             state: State::NoData,
@@ -115,15 +112,16 @@ impl StateMachine {
     }
 
     /// Takes the status of the next reception, due in every cycle; returns the state after it.
-    pub fn check(&mut self, status: ProfileStatus) -> State {
-        let config = self.config;
+    // In line: the configuration is a constant, whose numbers then need no memory.
+    #[inline(always)]
+    pub fn check(&mut self, config: &Config, status: ProfileStatus) -> State {
         self.state = match self.state {
             State::NoData => match status {
                 ProfileStatus::Error | ProfileStatus::NoNewData => State::NoData,
                 _ => State::Init,
             },
             State::Init => {
-                let (ok, errors) = self.add(status);
+                let (ok, errors) = self.add(config, status);
                 if errors > config.max_error_init.into() {
                     State::Invalid
                 } else if ok >= config.min_ok_init.into() {
@@ -133,7 +131,7 @@ impl StateMachine {
                 }
             }
             State::Valid => {
-                let (ok, errors) = self.add(status);
+                let (ok, errors) = self.add(config, status);
                 let is_valid =
                     errors <= config.max_error_valid.into() && ok >= config.min_ok_valid.into();
                 if is_valid {
@@ -143,7 +141,7 @@ impl StateMachine {
                 }
             }
             State::Invalid => {
-                let (ok, errors) = self.add(status);
+                let (ok, errors) = self.add(config, status);
                 let is_valid =
                     errors <= config.max_error_invalid.into() && ok >= config.min_ok_invalid.into();
                 if is_valid {
@@ -157,10 +155,18 @@ impl StateMachine {
     }
 
     /// Puts a status into the window; returns the numbers of good statuses and of errors in it.
-    fn add(&mut self, status: ProfileStatus) -> (u32, u32) {
+    #[inline(always)]
+    fn add(&mut self, config: &Config, status: ProfileStatus) -> (u32, u32) {
+        let window = u32::MAX.wrapping_shr(u32::BITS.wrapping_sub(config.window_size.into()));
         let is = |one: ProfileStatus| u32::from(status == one);
-        self.ok = (self.ok << 1 | is(ProfileStatus::Ok)) & self.window;
-        self.error = (self.error << 1 | is(ProfileStatus::Error)) & self.window;
+        self.ok = (self.ok << 1 | is(ProfileStatus::Ok)) & window;
+        self.error = (self.error << 1 | is(ProfileStatus::Error)) & window;
         (self.ok.count_ones(), self.error.count_ones())
+    }
+}
+
+impl Default for StateMachine {
+    fn default() -> Self {
+        Self::new()
     }
 }

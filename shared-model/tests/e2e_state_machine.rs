@@ -80,12 +80,16 @@ fn every_transition_of_the_specification() {
     ];
     for (before, ends) in table {
         for &(last, after) in ends {
-            let mut machine = StateMachine::new(CONFIG);
+            let mut machine = StateMachine::new();
             assert_eq!(machine.state(), NoData);
             for &status in before {
-                machine.check(status);
+                machine.check(&CONFIG, status);
             }
-            assert_eq!(machine.check(last), after, "{before:?}, then {last:?}");
+            assert_eq!(
+                machine.check(&CONFIG, last),
+                after,
+                "{before:?}, then {last:?}"
+            );
             assert_eq!(machine.state(), after);
         }
     }
@@ -162,25 +166,25 @@ proptest! {
         good_percent in 0..=100_u32,
         draws in prop::collection::vec((0..100_u32, 0..5_usize), 1..300),
     ) {
-        let mut machine = StateMachine::new(config);
+        let mut machine = StateMachine::new();
         let mut naive = Naive { config, window: VecDeque::new(), state: NoData };
         for (draw, other) in draws {
             let status = if draw < good_percent { Ok } else { STATUSES[other] };
-            prop_assert_eq!(machine.check(status), naive.check(status));
+            prop_assert_eq!(machine.check(&config, status), naive.check(status));
         }
     }
 }
 
 /// The statuses of a pattern until the sensor frames are invalid, from a full window of good ones.
 fn invalid_after(pattern: impl Iterator<Item = ProfileStatus>) -> Option<usize> {
-    let mut machine = StateMachine::new(SENSOR_STATE_MACHINE);
+    let mut machine = StateMachine::new();
     for _ in 0..100 {
-        machine.check(Ok);
+        machine.check(&SENSOR_STATE_MACHINE, Ok);
     }
     assert_eq!(machine.state(), Valid);
     let found = pattern
         .take(100_000)
-        .position(|status| machine.check(status) == Invalid);
+        .position(|status| machine.check(&SENSOR_STATE_MACHINE, status) == Invalid);
     found.map(|index| index + 1)
 }
 
@@ -203,9 +207,9 @@ fn thresholds_of_the_sensor_frames() {
 /// A random loss of 10 %, over ten million ticks.
 #[test]
 fn a_random_loss_of_a_tenth_is_tolerated() {
-    let mut machine = StateMachine::new(SENSOR_STATE_MACHINE);
+    let mut machine = StateMachine::new();
     for _ in 0..13 {
-        machine.check(Ok);
+        machine.check(&SENSOR_STATE_MACHINE, Ok);
     }
     let mut generator = 1_u64;
     for tick in 0..10_000_000 {
@@ -213,7 +217,7 @@ fn a_random_loss_of_a_tenth_is_tolerated() {
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
         let is_lost = (generator >> 33).is_multiple_of(10);
-        let state = machine.check(if is_lost { NoNewData } else { Ok });
+        let state = machine.check(&SENSOR_STATE_MACHINE, if is_lost { NoNewData } else { Ok });
         assert_eq!(state, Valid, "tick {tick}");
     }
 }

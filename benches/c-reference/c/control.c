@@ -224,9 +224,18 @@ static inline uint32_t age_ticks(const struct challenger *challenger, uint8_t ec
     return age >= 1 && age <= challenger->sent && nibble == (uint32_t)(echo >> 4) ? age : 0;
 }
 
+/* As Rust's, in line: the compiler's own would be a call into its library. */
+static inline int count_ones(uint32_t bits)
+{
+    bits -= bits >> 1 & 0x55555555;
+    bits = (bits & 0x33333333) + (bits >> 2 & 0x33333333);
+    bits = (bits + (bits >> 4)) & 0x0F0F0F0F;
+    return (int)(bits * 0x01010101 >> 24);
+}
+
 static inline bool holds(const struct state_machine *machine, int min_ok, int max_error)
 {
-    return __builtin_popcount(machine->error) <= max_error && __builtin_popcount(machine->ok) >= min_ok;
+    return count_ones(machine->error) <= max_error && count_ones(machine->ok) >= min_ok;
 }
 
 static inline enum communication check_state(struct state_machine *machine, enum reception reception, bool is_stale)
@@ -242,9 +251,9 @@ static inline enum communication check_state(struct state_machine *machine, enum
     machine->ok = (machine->ok << 1 | is_ok) & WINDOW;
     machine->error = (machine->error << 1 | is_error) & WINDOW;
     if (machine->state == INIT) {
-        if (__builtin_popcount(machine->error) > MAX_ERROR_INIT)
+        if (count_ones(machine->error) > MAX_ERROR_INIT)
             machine->state = INVALID;
-        else if (__builtin_popcount(machine->ok) >= MIN_OK_INIT)
+        else if (count_ones(machine->ok) >= MIN_OK_INIT)
             machine->state = VALID;
     } else if (machine->state == VALID) {
         machine->state = holds(machine, MIN_OK_VALID, MAX_ERROR_VALID) ? VALID : INVALID;

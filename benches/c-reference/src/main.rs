@@ -5,6 +5,9 @@
 mod count;
 mod drive;
 mod interface;
+// Each image has its logger; this is the laboratory's.
+#[path = "../../../firmware/src/bin/bench/log.rs"]
+mod log;
 
 use core::ffi::c_void;
 use core::mem::MaybeUninit;
@@ -12,9 +15,10 @@ use core::panic::PanicInfo;
 use cortex_m_semihosting::debug;
 use count::{Copies, REPEATS, Tally, counted};
 use drive::Drive;
+use firmware::bench::command_line::{self, Command};
+use firmware::bench::exit::{ExitCode, end_safely};
 use firmware::board::{Board, Current};
-use firmware::exit::ExitCode;
-use firmware::{command_line, fault, log};
+use firmware::fault::Fault;
 use interface::{
     Call, Choice, ControlInputOf, ControlOutputBits, InjectionOf, PwmInputOf, PwmOutput, StateBits,
 };
@@ -116,10 +120,10 @@ macro_rules! pair {
 fn main() -> ! {
     log::open();
     let code = match command_line::read() {
-        Ok(command) => run(&command.scenario),
-        Err(_) => ExitCode::BadScenario,
+        Ok(Command::Run(command)) => run(&command.scenario),
+        Ok(Command::Drill(_)) | Err(_) => ExitCode::BadScenario,
     };
-    fault::end_safely(code)
+    end_safely(code)
 }
 
 fn run(scenario: &Scenario<f32>) -> ExitCode {
@@ -365,7 +369,13 @@ const NO_OUTPUT: ControlOutput<f32> = ControlOutput {
     },
 };
 
+// SAFETY: the one function of that name, with the signature that the firmware's `fault` declares.
+#[unsafe(export_name = "enter_safe_state")]
+fn end_after_fault(fault: Fault) -> ! {
+    end_safely(fault.into())
+}
+
 #[panic_handler]
 fn panic(_info: &PanicInfo<'_>) -> ! {
-    fault::end_safely(ExitCode::Panic)
+    end_safely(ExitCode::Panic)
 }

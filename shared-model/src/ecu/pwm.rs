@@ -97,7 +97,8 @@ impl<T: Real> PwmTask<T> {
     pub fn begin(&mut self) -> PwmPeriod {
         let [a, b] = self.channels.both();
         let (a, b) = (a.begin(), b.begin());
-        self.note_channels(a == b);
+        let agree = a == b;
+        self.note_channels(agree);
         // Where the channels differ: of the two the duty nearer to neutral, and neutral itself if
         // they lie on both sides of it.
         let duty = self.neutral.median(a.duty, b.duty);
@@ -106,7 +107,7 @@ impl<T: Real> PwmTask<T> {
         PwmPeriod {
             duty,
             control_due: a.control_due || b.control_due,
-            bridge_on: a == b && a.bridge_on,
+            bridge_on: agree && a.bridge_on,
         }
     }
 

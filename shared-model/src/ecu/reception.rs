@@ -35,7 +35,7 @@ impl Reception {
         Self {
             receiver: Receiver::new(SENSOR_DATA_ID, MAX_DELTA_COUNTER),
             challenger: Challenger::new(),
-            state_machine: StateMachine::new(SENSOR_STATE_MACHINE),
+            state_machine: StateMachine::new(),
             counter: u8::MAX,
         }
     }
@@ -49,11 +49,14 @@ impl Reception {
             .and_then(|frame| self.challenger.age_ticks(challenge_echo(frame)))
             .filter(|&age_ticks| age_ticks <= max_age_ticks);
         let is_stale = whole.is_some() && age_ticks.is_none();
-        let state = self.state_machine.check(if is_stale {
+        let profile_status = if is_stale {
             ProfileStatus::Error
         } else {
             status.into()
-        });
+        };
+        let state = self
+            .state_machine
+            .check(&SENSOR_STATE_MACHINE, profile_status);
         let usable_age_ticks = age_ticks.filter(|_| state == State::Valid);
         if usable_age_ticks.is_some() {
             self.counter = self.receiver.counter();

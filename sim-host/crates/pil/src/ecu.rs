@@ -84,7 +84,7 @@ impl<T: Real> Model<T> {
             oscillator: Oscillator::new(&scenario.dither, scenario.run.pwm_rate_hz),
             pwm,
             challenger: Challenger::new(),
-            state_machine: StateMachine::new(SENSOR_STATE_MACHINE),
+            state_machine: StateMachine::new(),
             measurement: None,
             counter: u8::MAX,
             now: Setpoint::neutral(),
@@ -106,7 +106,7 @@ impl<T: Real> Model<T> {
             (Some(_), None) => ProfileStatus::Error,
             (Some(_), Some(_)) => ProfileStatus::Ok,
         };
-        let state = self.state_machine.check(status);
+        let state = self.state_machine.check(&SENSOR_STATE_MACHINE, status);
         let used = frame.filter(|_| age_ticks.is_some() && state == State::Valid);
         let new = used.map(|frame| decode_measurement(&frame).map(&|x| T::from_f64(x.into())));
         self.counter = used.map_or(self.counter, |[_, _, counter, ..]| counter);
