@@ -20,7 +20,7 @@ use tests::{TELEMETRY, TIME_OUT, board_image, record, run};
 const STM32F405: Machine = Machine::NetduinoPlus2;
 /// Clock of its timers without PLL, Hz.
 const STM32F405_TIMER_HZ: f32 = 16e6;
-const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
+const BOARDS: [&str; 4] = ["mps2", "netduinoplus2", "nrf52840dk", "nucleog474re"];
 const BAD_SCENARIO: i32 = 10;
 /// Start of every Cortex-M's RAM.
 const RAM_START: u64 = 0x2000_0000;

@@ -24,7 +24,7 @@ use std::path::Path;
 use std::time::Duration;
 use tests::{board_image, image};
 
-const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
+const BOARDS: [&str; 4] = ["mps2", "netduinoplus2", "nrf52840dk", "nucleog474re"];
 const BOARD: &str = "mps2";
 const MACHINE: Machine = Machine::Mps2An386;
 const LIMIT: Duration = Duration::from_secs(20);

@@ -19,7 +19,7 @@ use std::fs;
 use tests::golden::{Figure, check_figures};
 use tests::{TIME_OUT, board_image, image, record, root, scenario};
 
-const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
+const BOARDS: [&str; 4] = ["mps2", "netduinoplus2", "nrf52840dk", "nucleog474re"];
 const IMAGES: [&str; 2] = ["ecu", "bench"];
 /// Memory that the ECU's program may use on any board, bytes: limits of this project, far below
 /// what the boards have.

@@ -6,6 +6,7 @@
 extern crate std;
 
 pub mod bus;
+pub mod can;
 pub mod configuration;
 pub mod controller;
 pub mod diagnostic;

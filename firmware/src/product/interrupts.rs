@@ -1,8 +1,8 @@
 //! The two tasks in their interrupts. Nothing here can panic: the binary `panic-free` proves it at
 //! link time.
 
+use super::bus::ProductBus;
 use super::diagnosis::Diagnosis;
-use super::uart::Uart;
 use crate::board::{Board, Current};
 use crate::{clock, steering, tasks};
 use core::arch::naked_asm;
@@ -10,7 +10,7 @@ use core::cell::Cell;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use critical_section::Mutex;
-use shared_model::bus::{Bus, Message, SerialBus, latest};
+use shared_model::bus::{Bus, Message, latest};
 use shared_model::ecu::ControlInput;
 use shared_model::exchange::FrameBytes;
 use shared_model::signal::Mode;
@@ -34,7 +34,7 @@ pub struct ControlInterrupt {
     /// The program.
     pub steering: steering::Control,
     /// The bus.
-    pub bus: SerialBus<Uart>,
+    pub bus: ProductBus,
     /// Frame of the last control tick: the vehicle gets it when it takes effect.
     pub frame: Option<FrameBytes>,
     /// Diagnostic frames.

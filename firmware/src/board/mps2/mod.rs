@@ -151,7 +151,7 @@ impl Board for Mps2 {
             write_volatile(TIMER0_VALUE, u32::MAX);
             write_volatile(TIMER0_CTRL, 1);
         }
-        systick::start(&mut core.SYST, period);
+        systick::start(&mut core.SYST, period.into());
         Ok((VirtualPwm { period }, VirtualBridge))
     }
 

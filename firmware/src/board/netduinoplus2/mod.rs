@@ -1,7 +1,7 @@
 //! Netduino Plus 2: STM32F405 (Cortex-M4F), on silicon and as QEMU emulates it.
 //!
 //! TIM3's first channel, on pin PA6, is the servo's PWM, PA7 enables its bridge. TIM2 counts the cost
-//! of the tasks. USART1, on PB6 and PB7, is the bus. All clocks are the 16 MHz of the internal oscillator, which the
+//! of the tasks. USART1, on PB6 and PB7, is the bus, or CAN1, on PB8 and PB9. All clocks are the 16 MHz of the internal oscillator, which the
 //! chip has after a reset: the emulator has no clock controller, so a program that waits for the
 //! crystal or the PLL waits for ever.
 //!
@@ -11,6 +11,9 @@
 //! | SysTick, timers | 16 MHz | 168 MHz and 1 GHz, whatever the program sets |
 //! | watchdog | resets the chip | not there: it reads 0 and never bites |
 //! | cost | cycles, as the timer has the core's clock | virtual time |
+
+#[cfg(feature = "can")]
+mod can;
 
 use super::{Board, BoardError, systick};
 use fugit::TimerDurationU32;
@@ -96,7 +99,7 @@ impl Board for NetduinoPlus2 {
         pwm.enable();
         // Right after the restart of the period, so that the interrupt writes a duty early in a
         // period and it is taken over at that period's end, never ambiguous between two.
-        systick::start(&mut core.SYST, period);
+        systick::start(&mut core.SYST, period.into());
         Ok((pwm, pins.pa7.into_push_pull_output()))
     }
 

@@ -2,8 +2,11 @@
 //! has this chip.
 //!
 //! TIM3's first channel, on pin PA6, is the servo's PWM, PA7 enables its bridge. TIM2 counts the cost
-//! of the tasks. USART1, on PC4 and PC5, is the bus. All clocks are the 16 MHz of the internal oscillator, which the
+//! of the tasks. USART1, on PC4 and PC5, is the bus, or FDCAN1, on PB8 and PB9. All clocks are the 16 MHz of the internal oscillator, which the
 //! chip has after a reset.
+
+#[cfg(feature = "can")]
+mod can;
 
 use super::{Board, BoardError, systick};
 use shared_model::diagnostic::ResetCause;
@@ -75,7 +78,7 @@ impl Board for NucleoG474re {
         pwm.enable();
         // Right after the restart of the period, so that the interrupt writes a duty early in a
         // period and it is taken over at that period's end, never ambiguous between two.
-        systick::start(&mut core.SYST, period);
+        systick::start(&mut core.SYST, period.into());
         Ok((pwm, pins.pa7.into_push_pull_output()))
     }
 
