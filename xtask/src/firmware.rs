@@ -12,6 +12,9 @@ use crate::{process, rustup, workspace};
 /// The default board. Its images are where a plain `cargo build` puts them.
 pub const USUAL_BOARD: &str = "mps2";
 
+/// The feature that puts the product's bus on CAN.
+pub const CAN: [&str; 2] = ["--features", "can"];
+
 /// Cargo's variable for flags of the target's code alone.
 const RUSTFLAGS_OF_TARGET: &str = "CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS";
 
@@ -32,6 +35,30 @@ pub fn boards() -> Result<Vec<String>> {
 /// `["--bins"]`.
 pub fn build(toolchain: &str, board: &str, selection: &[&str]) -> Result<()> {
     process::run(cargo(toolchain, "build", board)?.args(selection))
+}
+
+/// Whether a board has a CAN.
+pub fn has_can(board: &str) -> bool {
+    let folder = workspace::firmware().join("src").join("board");
+    folder.join(board).join("can.rs").exists()
+}
+
+/// Builds the product with its bus on CAN, and its panic-free proof, as `ecu-can` and
+/// `panic-free-can`. The packages that it depends on are those of the other programs, so only the
+/// firmware itself is compiled again. Before `build`, which makes the files of the other names.
+pub fn build_can(toolchain: &str, board: &str) -> Result<()> {
+    let mut cargo = cargo(toolchain, "build", board)?;
+    let programs = ["ecu", "panic-free"];
+    for program in programs {
+        cargo.args(["--bin", program]);
+    }
+    process::run(cargo.args(CAN))?;
+    for program in programs {
+        let from = elf(board, program)?;
+        let to = elf(board, &format!("{program}-can"))?;
+        fs::copy(&from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
+    }
+    Ok(())
 }
 
 /// A command of cargo on the firmware for a board, in the firmware's folder, where its own
