@@ -20,6 +20,7 @@ pub mod frame;
 pub mod freshness;
 pub mod friction;
 pub mod gate;
+pub mod independent_clock;
 pub mod integrate;
 mod listed;
 pub mod open_loop;

@@ -31,10 +31,36 @@ pub fn boards() -> Result<Vec<String>> {
     Ok(boards)
 }
 
+/// The firmware's programs.
+const PROGRAMS: [&str; 3] = ["ecu", "bench", "panic-free"];
+
 /// Builds the firmware's programs that `selection` names for a board, or all of them for
 /// `["--bins"]`.
 pub fn build(toolchain: &str, board: &str, selection: &[&str]) -> Result<()> {
-    process::run(cargo(toolchain, "build", board)?.args(selection))
+    process::run(cargo(toolchain, "build", board)?.args(selection))?;
+    let is_selected = |program: &&str| selection.contains(program) || selection == ["--bins"];
+    for program in PROGRAMS.into_iter().filter(is_selected) {
+        place(board, program, program)?;
+    }
+    Ok(())
+}
+
+/// Copies a program from where the boards are built to the board's own folder, as `name`: the
+/// programs of all boards have the same names.
+fn place(board: &str, program: &str, name: &str) -> Result<()> {
+    let from = output(&build_dir(board)?, program);
+    let to = elf(board, name)?;
+    if from == to {
+        return Ok(());
+    }
+    if let Some(folder) = to.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    // It may be a link to a file of cargo's.
+    let _ = fs::remove_file(&to);
+    let copied = fs::copy(&from, &to);
+    copied.with_context(|| format!("cannot copy {} to {}", from.display(), to.display()))?;
+    Ok(())
 }
 
 /// Whether a board has a CAN.
@@ -54,9 +80,7 @@ pub fn build_can(toolchain: &str, board: &str) -> Result<()> {
     }
     process::run(cargo.args(CAN))?;
     for program in programs {
-        let from = elf(board, program)?;
-        let to = elf(board, &format!("{program}-can"))?;
-        fs::copy(&from, &to).with_context(|| format!("cannot copy {}", from.display()))?;
+        place(board, program, &format!("{program}-can"))?;
     }
     Ok(())
 }
@@ -64,7 +88,7 @@ pub fn build_can(toolchain: &str, board: &str) -> Result<()> {
 /// A command of cargo on the firmware for a board, in the firmware's folder, where its own
 /// configuration holds.
 pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
-    let mut cargo = cargo_for_target(toolchain, command, &target_dir(board)?)?;
+    let mut cargo = cargo_for_target(toolchain, command, &build_dir(board)?)?;
     cargo
         .arg("--no-default-features")
         .arg(format!("--features=board-{board}"));
@@ -73,7 +97,7 @@ pub fn cargo(toolchain: &str, command: &str, board: &str) -> Result<Command> {
 
 /// A command of cargo on a package for the usual board.
 pub fn cargo_on(toolchain: &str, command: &str, package: &str) -> Result<Command> {
-    let mut cargo = cargo_for_target(toolchain, command, &target_dir(USUAL_BOARD)?)?;
+    let mut cargo = cargo_for_target(toolchain, command, &build_dir(USUAL_BOARD)?)?;
     cargo.args(["--package", package]);
     Ok(cargo)
 }
@@ -106,14 +130,24 @@ fn cargo_for_target(toolchain: &str, command: &str, target_dir: &Path) -> Result
 
 /// An image for a board.
 pub fn elf(board: &str, image: &str) -> Result<PathBuf> {
-    Ok(target_dir(board)?.join(TARGET).join("firmware").join(image))
+    let common = workspace::target_dir()?;
+    let folder = match board {
+        USUAL_BOARD => common,
+        _ => common.join("boards").join(board),
+    };
+    Ok(output(&folder, image))
 }
 
-/// One for each board, or their programs, which have the same names, would replace each other.
-fn target_dir(board: &str) -> Result<PathBuf> {
+fn output(target_dir: &Path, image: &str) -> PathBuf {
+    target_dir.join(TARGET).join("firmware").join(image)
+}
+
+/// The usual board has the usual folder; all others share one, so that a board costs the packages of
+/// its own chip and not those of all.
+fn build_dir(board: &str) -> Result<PathBuf> {
     let common = workspace::target_dir()?;
     Ok(match board {
         USUAL_BOARD => common,
-        _ => common.join("boards").join(board),
+        _ => common.join("boards").join("shared"),
     })
 }

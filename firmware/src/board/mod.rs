@@ -9,6 +9,7 @@ pub mod rings;
 mod systick;
 
 use shared_model::diagnostic::ResetCause;
+use shared_model::independent_clock::IndependentClock;
 
 #[cfg(feature = "board-mps2")]
 mod mps2;
@@ -48,6 +49,8 @@ pub trait Board {
     const COST_CLOCK_HZ: u32;
     /// Instructions per second of a simulated core; 0 on silicon.
     const INSTRUCTION_RATE_HZ: u32;
+    /// The clock of [`independent_counter`](Self::independent_counter).
+    const INDEPENDENT_CLOCK: IndependentClock;
     /// Interrupts of the UART. The first is the one that the program may pend.
     const UART_INTERRUPTS: &[u16];
 
@@ -80,6 +83,12 @@ pub trait Board {
 
     /// A free-running counter, upwards, of 32 bits.
     fn cost_counter() -> u32;
+
+    /// Starts the independent counter.
+    fn start_independent_counter();
+
+    /// A free-running counter, upwards, with an oscillator that is not that of the core.
+    fn independent_counter() -> u32;
 
     /// Starts the watchdog. When it is not fed for `timeout_ms`, it raises the non-maskable
     /// interrupt or, where it can only do that, resets the chip, whose pins then leave the

@@ -13,6 +13,7 @@ use shared_model::bus::{Bus, Message};
 use shared_model::configuration::ConfigurationError;
 use shared_model::diagnostic::{FAULTS_IN_A_ROW, History, ResetCause};
 use shared_model::ecu::Ecu;
+use shared_model::independent_clock::ClockCheck;
 use shared_model::signal::Mode;
 
 /// The watchdog bites when no control tick comes for this many control periods, or for this long,
@@ -88,12 +89,18 @@ fn steer(scenario: &Scenario<f32>, ecu: Ecu<f32>, bus: ProductBus, start: Start)
     let samples_per_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
     let timeout_ms = (WATCHDOG_PERIODS * 1000.0 / rate_hz) as u32;
     let diagnosis_ticks = ((DIAGNOSIS_S * rate_hz) as u32).max(1);
+    Current::start_independent_counter();
     let started = critical_section::with(|_| {
         let (pin, bridge) = Current::start_pwm(period).ok()?;
         tasks::set_priorities();
         let pwm = cortex_m::singleton!(: PwmInterrupt = PwmInterrupt {
             steering: steering::Pwm { task: ecu.pwm, pin, bridge },
             last_tick_counts: Current::cost_counter(),
+            clock_check: ClockCheck::new(
+                &Current::INDEPENDENT_CLOCK,
+                rate_hz,
+                scenario.gate.tick_tolerance,
+            ),
         })?;
         let control = cortex_m::singleton!(: ControlInterrupt = ControlInterrupt {
             steering: steering::Control { task: ecu.control },

@@ -14,10 +14,12 @@
 
 #[cfg(feature = "can")]
 mod can;
+mod rtc;
 
 use super::{Board, BoardError, systick};
 use fugit::TimerDurationU32;
 use shared_model::diagnostic::ResetCause;
+use shared_model::independent_clock::IndependentClock;
 use stm32f4xx_hal::gpio::{Output, PA7, PushPull};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
@@ -61,6 +63,13 @@ impl Board for NetduinoPlus2 {
     // The reports count instructions in the emulator. On silicon: CLOCK_HZ and 0.
     const COST_CLOCK_HZ: u32 = emulated::COST_CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = emulated::PROGRAM_INSTRUCTION_RATE_HZ;
+    /// The sub-seconds of the RTC with the low-speed oscillator, LSI. QEMU has neither.
+    const INDEPENDENT_CLOCK: IndependentClock = IndependentClock {
+        nominal_hz: 32_000,
+        least_hz: 17_000,
+        most_hz: 47_000,
+        bits: 15,
+    };
     const UART_INTERRUPTS: &[u16] = &[pac::Interrupt::USART1 as u16];
 
     fn reset_cause() -> ResetCause {
@@ -129,6 +138,14 @@ impl Board for NetduinoPlus2 {
     fn cost_counter() -> u32 {
         // SAFETY: a read of the counter, without side effect.
         unsafe { (*pac::TIM2::ptr()).cnt().read().cnt().bits() }
+    }
+
+    fn start_independent_counter() {
+        rtc::start();
+    }
+
+    fn independent_counter() -> u32 {
+        rtc::counter()
     }
 
     fn start_watchdog(timeout_ms: u32) {

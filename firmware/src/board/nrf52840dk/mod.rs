@@ -16,6 +16,7 @@ use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 use nrf52840_pac as pac;
 use shared_model::diagnostic::ResetCause;
+use shared_model::independent_clock::IndependentClock;
 
 /// Clock of PWM and timers, Hz.
 const TIMER_CLOCK_HZ: u32 = 16_000_000;
@@ -140,6 +141,13 @@ impl Board for Nrf52840Dk {
     const CORE_CLOCK_HZ: u32 = CORE_CLOCK_HZ;
     const COST_CLOCK_HZ: u32 = TIMER_CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = 0;
+    /// RTC0 with the low-speed RC oscillator.
+    const INDEPENDENT_CLOCK: IndependentClock = IndependentClock {
+        nominal_hz: 32_768,
+        least_hz: 31_130,
+        most_hz: 34_406,
+        bits: 24,
+    };
     const UART_INTERRUPTS: &[u16] = &[pac::Interrupt::UARTE0_UART0 as u16];
 
     fn reset_cause() -> ResetCause {
@@ -224,6 +232,22 @@ impl Board for Nrf52840Dk {
         // SAFETY: a task takes a one.
         timer.tasks_capture[0].write(|w| unsafe { w.bits(1) });
         timer.cc[0].read().bits()
+    }
+
+    fn start_independent_counter() {
+        // SAFETY: nothing else uses the counter and the low-speed clock.
+        let (clock, counter) = unsafe { (&*pac::CLOCK::ptr(), &*pac::RTC0::ptr()) };
+        // SAFETY: values that the registers take; the RC oscillator is the source after a reset.
+        unsafe {
+            clock.tasks_lfclkstart.write(|w| w.bits(1));
+            counter.prescaler.write(|w| w.bits(0));
+            counter.tasks_start.write(|w| w.bits(1));
+        }
+    }
+
+    fn independent_counter() -> u32 {
+        // SAFETY: a read of the counter, without side effect.
+        unsafe { (*pac::RTC0::ptr()).counter.read().bits() }
     }
 
     /// It can only reset: its interrupt comes 61 us before, and is not used.

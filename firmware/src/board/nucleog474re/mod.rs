@@ -10,6 +10,7 @@ mod can;
 
 use super::{Board, BoardError, systick};
 use shared_model::diagnostic::ResetCause;
+use shared_model::independent_clock::IndependentClock;
 use stm32g4xx_hal::gpio::{AF2, Output, PA6, PA7, PushPull};
 use stm32g4xx_hal::independent_watchdog::IndependentWatchdog;
 use stm32g4xx_hal::prelude::*;
@@ -39,6 +40,13 @@ impl Board for NucleoG474re {
     const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
     const COST_CLOCK_HZ: u32 = CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = 0;
+    /// LPTIM1 with the low-speed oscillator, LSI.
+    const INDEPENDENT_CLOCK: IndependentClock = IndependentClock {
+        nominal_hz: 32_000,
+        least_hz: 29_500,
+        most_hz: 34_000,
+        bits: 16,
+    };
     const UART_INTERRUPTS: &[u16] = &[pac::Interrupt::USART1 as u16];
 
     fn reset_cause() -> ResetCause {
@@ -111,6 +119,33 @@ impl Board for NucleoG474re {
     fn cost_counter() -> u32 {
         // SAFETY: a read of the counter, without side effect.
         unsafe { (*pac::TIM2::ptr()).cnt().read().bits() }
+    }
+
+    fn start_independent_counter() {
+        // SAFETY: the low-power timer is used by nothing else, and the clocks by nothing that runs
+        // at the same time.
+        let (rcc, timer) = unsafe { (&*pac::RCC::ptr(), &*pac::LPTIMER1::ptr()) };
+        rcc.csr().modify(|_, w| w.lsion().set_bit());
+        rcc.apb1enr1().modify(|_, w| w.lptim1en().set_bit());
+        // SAFETY: LSI, by the reference manual RM0440, 7.4.27.
+        rcc.ccipr()
+            .modify(|r, w| unsafe { w.bits(r.bits() & !(0b11 << 18) | 0b01 << 18) });
+        // SAFETY: values that the registers take: no prescaler, on, the greatest period, started.
+        unsafe {
+            timer.cfgr().write(|w| w.bits(0));
+            timer.cr().write(|w| w.bits(0b001));
+            timer.arr().write(|w| w.bits(0xFFFF));
+            timer.cr().write(|w| w.bits(0b101));
+        }
+    }
+
+    fn independent_counter() -> u32 {
+        // SAFETY: reads of the counter, without side effect.
+        let timer = unsafe { &*pac::LPTIMER1::ptr() };
+        // Its clock is another: a count is right if two reads are equal.
+        let read = || timer.cnt().read().bits() & 0xFFFF;
+        let (first, second) = (read(), read());
+        if first == second { first } else { read() }
     }
 
     fn start_watchdog(timeout_ms: u32) {
