@@ -41,7 +41,7 @@ pub struct ClockCheck {
     ticks_per_window: u32,
     least_counts: u32,
     most_counts: u32,
-    tolerance_permille: u32,
+    tolerance_1024ths: u32,
     ticks: u32,
     start: u32,
     /// Windows so far, at most 2: the first is discarded, as the oscillator may still be starting.
@@ -64,7 +64,7 @@ impl ClockCheck {
             ticks_per_window,
             least_counts: (least as u32).saturating_sub(RESOLUTION_COUNTS),
             most_counts: (most as u32).saturating_add(RESOLUTION_COUNTS),
-            tolerance_permille: (1000.0 * tolerance) as u32,
+            tolerance_1024ths: (1024.0 * tolerance) as u32,
             ticks: 0,
             start: 0,
             windows: 0,
@@ -94,7 +94,7 @@ impl ClockCheck {
         }
         let is_possible = (self.least_counts..=self.most_counts).contains(&counts);
         let change = u64::from(counts.abs_diff(self.reference));
-        let allowed = u64::from(self.reference) * u64::from(self.tolerance_permille) / 1000;
+        let allowed = u64::from(self.reference) * u64::from(self.tolerance_1024ths) >> 10;
         is_possible && change <= allowed + u64::from(RESOLUTION_COUNTS)
     }
 }
@@ -194,6 +194,6 @@ mod tests {
         assert_eq!(ClockCheck::new(&fast, RATE_HZ, 0.2).ticks_per_window, 1);
         assert_eq!(ClockCheck::new(&G474, RATE_HZ, 0.2).ticks_per_window, 9);
         assert_eq!(ClockCheck::new(&G474, 20.0, 0.2).ticks_per_window, 1);
-        assert_eq!(ClockCheck::new(&G474, 20.0, 0.01).tolerance_permille, 100);
+        assert_eq!(ClockCheck::new(&G474, 20.0, 0.01).tolerance_1024ths, 102);
     }
 }
