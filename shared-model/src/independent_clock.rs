@@ -94,7 +94,7 @@ impl ClockCheck {
         }
         let is_possible = (self.least_counts..=self.most_counts).contains(&counts);
         let change = u64::from(counts.abs_diff(self.reference));
-        let allowed = u64::from(self.reference) * u64::from(self.tolerance_1024ths) >> 10;
+        let allowed = (u64::from(self.reference) * u64::from(self.tolerance_1024ths)) >> 10;
         is_possible && change <= allowed + u64::from(RESOLUTION_COUNTS)
     }
 }

@@ -108,10 +108,7 @@ const fn timing_bits(timing: BitTiming) -> u32 {
 
 /// Bank 0 as a list of four identifiers of 16 bits: the three segments of the sensor message, the
 /// first of them twice. The reset value of the other settings sends all to queue 0.
-///
-/// # Safety
-/// The controller must be in initialisation.
-unsafe fn set_filter(can: &pac::can1::RegisterBlock) {
+fn set_filter(can: &pac::can1::RegisterBlock) {
     let first = u32::from(first_identifier(Message::Sensor));
     let entries = |low: u32, high: u32| high << 21 | low << 5;
     // SAFETY: values that the registers take.

@@ -127,9 +127,7 @@ impl Board for NucleoG474re {
         let (rcc, timer) = unsafe { (&*pac::RCC::ptr(), &*pac::LPTIMER1::ptr()) };
         rcc.csr().modify(|_, w| w.lsion().set_bit());
         rcc.apb1enr1().modify(|_, w| w.lptim1en().set_bit());
-        // SAFETY: LSI, by the reference manual RM0440, 7.4.27.
-        rcc.ccipr()
-            .modify(|r, w| unsafe { w.bits(r.bits() & !(0b11 << 18) | 0b01 << 18) });
+        rcc.ccipr().modify(|_, w| w.lptim1sel().lsi());
         // SAFETY: values that the registers take: no prescaler, on, the greatest period, started.
         unsafe {
             timer.cfgr().write(|w| w.bits(0));
