@@ -1,6 +1,6 @@
 //! Puts the board's memory map where the linker finds it, and selects the linker scripts.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::{env, fs};
 
 /// Prefix of cargo's variable for a board whose feature is on.
@@ -18,6 +18,14 @@ fn main() {
         );
         return;
     };
+    if env::var_os("CARGO_FEATURE_CAN").is_some()
+        && !Path::new(&format!("src/board/{board}/can.rs")).exists()
+    {
+        println!(
+            "cargo::error=the board {board} has no CAN: build without the feature `can`, or write src/board/{board}/can.rs"
+        );
+        return;
+    }
     let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
     let map = format!("src/board/{board}/memory.x");
     fs::copy(&map, out.join("board-memory.x")).expect("the board's memory map is readable");

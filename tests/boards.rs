@@ -20,7 +20,7 @@ use tests::{TELEMETRY, TIME_OUT, board_image, record, run};
 const STM32F405: Machine = Machine::NetduinoPlus2;
 /// Clock of its timers without PLL, Hz.
 const STM32F405_TIMER_HZ: f32 = 16e6;
-const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
+const BOARDS: [&str; 4] = ["mps2", "netduinoplus2", "nrf52840dk", "nucleog474re"];
 const BAD_SCENARIO: i32 = 10;
 /// Start of every Cortex-M's RAM.
 const RAM_START: u64 = 0x2000_0000;
@@ -101,6 +101,41 @@ fn every_duty_is_in_the_timers_register() {
         let bits = bits(&firmware, &host);
         assert_eq!(bits.differing, 0, "{:?}", bits.first);
     }
+}
+
+/// The ends of the duty, at another period than usual: a square dither of the whole bus voltage, and
+/// no other voltage.
+#[test]
+fn no_and_full_duty_at_another_period_are_in_the_timers_registers() {
+    let mut scenario = scenario(Waveform::Square);
+    scenario.dither.start_time_s = 0.0;
+    scenario.servo.bus_voltage_v = 0.1;
+    scenario.servo.winding_resistance_ohm = 0.0;
+    scenario.dither.amplitude_v = 0.1;
+    scenario.run.pwm_rate_hz = 20_000.0;
+    scenario.run.control_rate_hz = 20.0;
+    scenario.run.duration_s = 0.05;
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    let mut run = start(&scenario, folder.path());
+    assert_eq!(read(&mut run.qmp, CCER) & 1, 0, "off after a reset");
+    to_interrupt(&mut run);
+    assert_eq!(
+        [CCR1, ARR].map(|register| read(&mut run.qmp, register)),
+        [400, 799],
+        "neutral before the first interrupt"
+    );
+    let expected = expected_registers(&scenario);
+    for end in [0, 800] {
+        assert!(expected.iter().any(|&(code, _)| code == end), "{end}");
+    }
+    let found: Vec<(u32, u32)> = (0..expected.len())
+        .map(|_| {
+            let stop = run.gdb.run_to_stop(TIME_OUT).expect("the core stops");
+            assert_eq!(stop, Stop::Breakpoint);
+            (read(&mut run.qmp, CCR1), read(&mut run.qmp, ARR))
+        })
+        .collect();
+    assert_eq!(found, expected);
 }
 
 /// Data written to the RAM through the core is visible past it, and conversely; there is nothing

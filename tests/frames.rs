@@ -5,6 +5,10 @@
 use autosar_e2e::profile5::{Profile5, Profile5Config};
 use autosar_e2e::{E2EProfile, E2EStatus};
 use fastrand::Rng;
+use shared_model::bus::Message;
+use shared_model::diagnostic::{
+    DIAGNOSTIC_DATA_ID, Diagnostic, Record, ResetCause, encode_diagnostic,
+};
 use shared_model::e2e::{Receiver, Sender, Status};
 use shared_model::ecu::Warning;
 use shared_model::exchange::{FRAME_LEN, FrameBytes};
@@ -13,6 +17,7 @@ use shared_model::frame::{
     encode_measurement,
 };
 use shared_model::gate::Fault;
+use shared_model::segments::first_identifier;
 use shared_model::signal::{Actuation, Measurement, Mode};
 use std::fs;
 use std::io::Write;
@@ -26,6 +31,7 @@ const FRAMES: usize = 400;
 type Kind = (&'static str, u16);
 const SENSOR: Kind = ("SensorFrame", SENSOR_DATA_ID);
 const ACTUATOR: Kind = ("ActuatorFrame", ACTUATOR_DATA_ID);
+const DIAGNOSTIC: Kind = ("DiagnosticFrame", DIAGNOSTIC_DATA_ID);
 
 /// The Python of `cargo xtask setup`.
 ///
@@ -54,6 +60,7 @@ fn query(questions: &[String]) -> Vec<Vec<String>> {
         .arg("-I")
         .arg(tests.join("python/check_frames.py"))
         .arg(tests.with_file_name("docs").join("dithersteer.dbc"))
+        .arg(tests.with_file_name("docs").join("dithersteer-classic.dbc"))
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()
@@ -194,6 +201,56 @@ fn actuator_signals(a: &Actuation<f32>) -> Signals {
     ]
 }
 
+fn diagnostic(rng: &mut Rng) -> Diagnostic {
+    if rng.bool() {
+        Diagnostic::Status {
+            reset_cause: rng.choice(ResetCause::ALL).expect("there are some"),
+            configuration: rng.u8(..),
+            faults_in_a_row: rng.u16(..),
+            starts: rng.u32(..),
+            ticks: rng.u32(..),
+        }
+    } else {
+        Diagnostic::Fault {
+            index: rng.u8(..4),
+            record: Record {
+                // Beyond the numbers that the DBC file names.
+                fault: rng.u8(6..),
+                start: rng.u16(..),
+                gate_faults: rng.u32(..),
+                ticks: rng.u32(..),
+            },
+        }
+    }
+}
+
+fn diagnostic_signals(diagnostic: &Diagnostic) -> Signals {
+    match *diagnostic {
+        Diagnostic::Status {
+            reset_cause,
+            configuration,
+            faults_in_a_row,
+            starts,
+            ticks,
+        } => vec![
+            ("kind", Value::text("Status")),
+            ("reset_cause", Value::text(format!("{reset_cause:?}"))),
+            ("configuration", Value::text(configuration)),
+            ("faults_in_a_row", Value::text(faults_in_a_row)),
+            ("starts", Value::text(starts)),
+            ("ticks_since_start", Value::text(ticks)),
+        ],
+        Diagnostic::Fault { index, record } => vec![
+            ("kind", Value::text("FaultRecord")),
+            ("record", Value::text(index)),
+            ("program_fault", Value::text(record.fault)),
+            ("start_of_fault", Value::text(record.start)),
+            ("gate_faults", Value::text(record.gate_faults)),
+            ("ticks_to_fault", Value::text(record.ticks)),
+        ],
+    }
+}
+
 /// The frames of one sender of each kind, with their content.
 fn frames() -> Vec<(Kind, FrameBytes, Signals)> {
     let mut rng = Rng::with_seed(4);
@@ -216,7 +273,19 @@ fn frames() -> Vec<(Kind, FrameBytes, Signals)> {
             actuator_signals(&a),
         )
     });
-    sensors.into_iter().chain(actuators).collect()
+    let actuators: Vec<_> = actuators.collect();
+    let mut sender = Sender::new(DIAGNOSTIC_DATA_ID);
+    let diagnostics = (0..FRAMES).map(|_| diagnostic(&mut rng)).map(|d| {
+        (
+            DIAGNOSTIC,
+            encode_diagnostic(&d, &mut sender),
+            diagnostic_signals(&d),
+        )
+    });
+    let mut frames = sensors;
+    frames.extend(actuators);
+    frames.extend(diagnostics);
+    frames
 }
 
 #[test]
@@ -244,6 +313,56 @@ fn bytes_checks_and_signals_are_those_of_python() {
             let (decoded_name, decoded_value) = pair.split_once('=').expect("name=value");
             assert_eq!(decoded_name, *name, "{context}");
             assert!(value.is(decoded_value), "{name} is {value:?}; {context}");
+        }
+    }
+}
+
+/// The name of a signal on classic CAN: the kind is in another frame than these.
+fn classic_name(name: &str) -> &str {
+    match name {
+        "starts" | "gate_faults" => "starts_or_gate_faults",
+        "ticks_since_start" | "ticks_to_fault" => "ticks",
+        name => name,
+    }
+}
+
+#[test]
+fn signals_on_classic_can_are_those_of_python() {
+    let frames = frames();
+    let questions: Vec<String> = frames
+        .iter()
+        .map(|(kind, frame, _)| format!("classic {}", question(*kind, frame)))
+        .collect();
+    for ((kind, _, signals), decoded) in frames.iter().zip(query(&questions)) {
+        let [_, _, decoded @ ..] = &decoded[..] else {
+            panic!("{}: {decoded:?}", kind.0);
+        };
+        assert_eq!(decoded.len(), signals.len(), "{}: {decoded:?}", kind.0);
+        for ((name, value), pair) in signals.iter().zip(decoded) {
+            let (decoded_name, decoded_value) = pair.split_once('=').expect("name=value");
+            assert_eq!(decoded_name, classic_name(name), "{}", kind.0);
+            assert!(value.is(decoded_value), "{name} is {value:?}: {pair}");
+        }
+    }
+}
+
+/// The identifiers of both files are those of the program.
+#[test]
+fn the_dbc_files_have_the_identifiers() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).with_file_name("docs");
+    let read = |name: &str| fs::read_to_string(folder.join(name)).expect("the DBC file is there");
+    let (fd, classic) = (read("dithersteer.dbc"), read("dithersteer-classic.dbc"));
+    for (message, name) in [
+        (Message::Sensor, SENSOR.0),
+        (Message::Actuator, ACTUATOR.0),
+        (Message::Diagnostic, DIAGNOSTIC.0),
+    ] {
+        let line = format!("BO_ {} {name}: 24 ", message.can_identifier());
+        assert!(fd.contains(&line), "{line}");
+        for segment in 0..3 {
+            let identifier = first_identifier(message) + segment;
+            let line = format!("BO_ {identifier} {name}{}: 8 ", segment + 1);
+            assert!(classic.contains(&line), "{line}");
         }
     }
 }
@@ -306,7 +425,7 @@ fn state_machine() -> String {
 
 #[test]
 fn dbc_file_has_the_constants() {
-    let kinds = [SENSOR, ACTUATOR];
+    let kinds = [SENSOR, ACTUATOR, DIAGNOSTIC];
     for ((_, data_id), answer) in kinds
         .iter()
         .zip(query(&kinds.map(|(name, _)| name.to_owned())))

@@ -24,7 +24,9 @@ use std::path::Path;
 use std::time::Duration;
 use tests::{board_image, image};
 
-const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
+const BOARDS: [&str; 4] = ["mps2", "netduinoplus2", "nrf52840dk", "nucleog474re"];
+/// Boards with a CAN.
+const CAN_BOARDS: [&str; 2] = ["netduinoplus2", "nucleog474re"];
 const BOARD: &str = "mps2";
 const MACHINE: Machine = Machine::Mps2An386;
 const LIMIT: Duration = Duration::from_secs(20);
@@ -146,6 +148,9 @@ fn no_breakpoint_is_in_the_product() {
             graph.functions.values().map(|f| f.breakpoints).sum()
         };
         assert_eq!(breakpoints("ecu"), 0, "{board}");
+        if CAN_BOARDS.contains(&board) {
+            assert_eq!(breakpoints("ecu-can"), 0, "{board}");
+        }
         assert!(breakpoints("bench") > 4, "{board}: the count can see them");
     }
 }

@@ -19,7 +19,9 @@ use std::fs;
 use tests::golden::{Figure, check_figures};
 use tests::{TIME_OUT, board_image, image, record, root, scenario};
 
-const BOARDS: [&str; 3] = ["mps2", "netduinoplus2", "nucleog474re"];
+const BOARDS: [&str; 4] = ["mps2", "netduinoplus2", "nrf52840dk", "nucleog474re"];
+/// Boards with a CAN.
+const CAN_BOARDS: [&str; 2] = ["netduinoplus2", "nucleog474re"];
 const IMAGES: [&str; 2] = ["ecu", "bench"];
 /// Memory that the ECU's program may use on any board, bytes: limits of this project, far below
 /// what the boards have.
@@ -29,11 +31,12 @@ const RAM_LIMIT_BYTES: u32 = 64 * 1024;
 /// Spread of the time between PWM interrupts, counts of 40 ns.
 const JITTER_LIMIT_COUNTS: u32 = 25;
 
-/// Every image of every board.
+/// Every image of every board; the product with its bus on CAN last.
 fn images() -> impl Iterator<Item = (&'static str, &'static str)> {
-    BOARDS
-        .into_iter()
+    let usual = BOARDS.into_iter();
+    usual
         .flat_map(|board| IMAGES.map(|image| (board, image)))
+        .chain(CAN_BOARDS.map(|board| (board, "ecu-can")))
 }
 
 fn memory_map(board: &str) -> Map {
@@ -166,8 +169,10 @@ fn flash_and_ram() {
 /// Beside the link that proves it: the image holds no code that panics.
 #[test]
 fn no_panic_is_in_the_panic_free_image() {
-    for board in BOARDS {
-        let functions = function_names(&board_image(board, "panic-free"));
+    let usual = BOARDS.map(|board| (board, "panic-free"));
+    let can = CAN_BOARDS.map(|board| (board, "panic-free-can"));
+    for (board, name) in usual.into_iter().chain(can) {
+        let functions = function_names(&board_image(board, name));
         assert!(
             functions.iter().any(|name| name == "SysTick"),
             "{board}: {functions:?}"

@@ -15,6 +15,7 @@ pub mod bench;
 pub mod board;
 pub mod clock;
 pub mod fault;
+mod nvic;
 pub mod product;
 pub mod refusal;
 pub mod stack;

@@ -44,9 +44,9 @@ impl Pwm {
         let period = self.task.begin();
         // The second way to switch off: it acts at once, and not with the next period.
         let _ = if period.bridge_on {
-            self.bridge.set_high()
+            OutputPin::set_high(&mut self.bridge)
         } else {
-            self.bridge.set_low()
+            OutputPin::set_low(&mut self.bridge)
         };
         // The PWM's period is the duty's, so the code fits; one that is refused is found on the
         // pin.

@@ -6,6 +6,7 @@
 extern crate std;
 
 pub mod bus;
+pub mod can;
 pub mod configuration;
 pub mod controller;
 pub mod diagnostic;
@@ -19,6 +20,7 @@ pub mod frame;
 pub mod freshness;
 pub mod friction;
 pub mod gate;
+pub mod independent_clock;
 pub mod integrate;
 mod listed;
 pub mod open_loop;

@@ -1,9 +1,10 @@
 """Answers questions about frames with autosar-e2e and cantools, which share no code with this project.
 
-The DBC file is named on the command line. Each line on standard input gets one line in answer:
+The DBC files, for CAN FD and for classic CAN, are named on the command line. Each line on standard input gets one line in answer:
 
 MESSAGE      what the DBC file says of the message: key=value ...
 MESSAGE HEX  the bytes protected anew, the verdict of the check on the bytes as they are, then signal=value ...
+classic MESSAGE HEX  signal=value ... of the three frames on classic CAN
 """
 
 import sys
@@ -65,8 +66,19 @@ def answer(message, data=None):
     return [protected(data, data_id), verdict, *pairs(message.decode(data))]
 
 
+def classic_answer(name, data):
+    data = bytes.fromhex(data)
+    segments = [data[start : start + 8] for start in range(0, len(data), 8)]
+    messages = [classic.get_message_by_name(f"{name}{number}") for number in (1, 2, 3)]
+    return [pair for message, segment in zip(messages, segments) for pair in pairs(message.decode(segment))]
+
+
 database = cantools.database.load_file(sys.argv[1])
+classic = cantools.database.load_file(sys.argv[2])
 # All questions first: who asks may not read before everything is written.
 for line in sys.stdin.read().splitlines():
     name, *data = line.split()
-    print(*answer(database.get_message_by_name(name), *data))
+    if name == "classic":
+        print(*classic_answer(*data))
+    else:
+        print(*answer(database.get_message_by_name(name), *data))

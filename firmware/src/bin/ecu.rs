@@ -9,7 +9,7 @@ use cortex_m_rt::{entry, exception};
 use defmt_rtt as _;
 use firmware::fault::{Fault, enter_safe_state};
 use firmware::product::interrupts::{self, ControlInterrupt, PwmInterrupt};
-use firmware::product::{app, safe_state, uart};
+use firmware::product::{app, bus, safe_state};
 
 #[entry]
 fn main() -> ! {
@@ -28,11 +28,11 @@ fn PendSV() {
     interrupts::control(INTERRUPT);
 }
 
-/// The UART's interrupt; any other has no business here.
-// SAFETY: the UART's own state is taken in a critical section; the rest does not return.
+/// The interrupt of the bus; any other has no business here.
+// SAFETY: the bus's own state is taken in a critical section; the rest does not return.
 #[exception]
 unsafe fn DefaultHandler(number: i16) {
-    if !uart::interrupt(number) {
+    if !bus::interrupt(number) {
         enter_safe_state(Fault::UnexpectedInterrupt);
     }
 }

@@ -73,7 +73,7 @@ fn PendSV() {
 // SAFETY: none; this image is linked, not run.
 #[exception]
 unsafe fn DefaultHandler(number: i16) {
-    if !product::uart::interrupt(number) {
+    if !product::bus::interrupt(number) {
         enter_safe_state(Fault::UnexpectedInterrupt);
     }
 }

@@ -4,9 +4,12 @@
 //! A board is one folder here, with its code and its memory map, and one feature `board-<folder>`.
 //! The build takes exactly one. docs/porting.md leads through a port.
 
+#[cfg(feature = "can")]
+pub mod rings;
 mod systick;
 
 use shared_model::diagnostic::ResetCause;
+use shared_model::independent_clock::IndependentClock;
 
 #[cfg(feature = "board-mps2")]
 mod mps2;
@@ -17,6 +20,11 @@ pub use mps2::Mps2 as Current;
 mod netduinoplus2;
 #[cfg(feature = "board-netduinoplus2")]
 pub use netduinoplus2::NetduinoPlus2 as Current;
+
+#[cfg(feature = "board-nrf52840dk")]
+mod nrf52840dk;
+#[cfg(feature = "board-nrf52840dk")]
+pub use nrf52840dk::Nrf52840Dk as Current;
 
 #[cfg(feature = "board-nucleog474re")]
 mod nucleog474re;
@@ -35,10 +43,14 @@ pub trait Board {
     /// Clock of the PWM's timer, Hz. A scenario whose `servo.timer_clock_hz` is another is refused:
     /// its carrier and all its times would be off by the ratio.
     const TIMER_CLOCK_HZ: u32;
+    /// Clock of the core, Hz.
+    const CORE_CLOCK_HZ: u32 = Self::TIMER_CLOCK_HZ;
     /// Counts per second of [`cost_counter`](Self::cost_counter).
     const COST_CLOCK_HZ: u32;
     /// Instructions per second of a simulated core; 0 on silicon.
     const INSTRUCTION_RATE_HZ: u32;
+    /// The clock of [`independent_counter`](Self::independent_counter).
+    const INDEPENDENT_CLOCK: IndependentClock;
     /// Interrupts of the UART. The first is the one that the program may pend.
     const UART_INTERRUPTS: &[u16];
 
@@ -72,6 +84,12 @@ pub trait Board {
     /// A free-running counter, upwards, of 32 bits.
     fn cost_counter() -> u32;
 
+    /// Starts the independent counter.
+    fn start_independent_counter();
+
+    /// A free-running counter, upwards, with an oscillator that is not that of the core.
+    fn independent_counter() -> u32;
+
     /// Starts the watchdog. When it is not fed for `timeout_ms`, it raises the non-maskable
     /// interrupt or, where it can only do that, resets the chip, whose pins then leave the
     /// servo's bridge off.
@@ -99,6 +117,22 @@ pub trait Board {
     fn idle() {
         cortex_m::asm::wfi();
     }
+}
+
+/// A board with a CAN, in its file `can.rs`.
+#[cfg(feature = "can")]
+pub trait CanBoard: Board {
+    /// The product's bus.
+    type Bus: shared_model::bus::Bus;
+
+    /// Interrupts of the CAN; none where the control task reads the hardware's own queue.
+    const CAN_INTERRUPTS: &[u16];
+
+    /// Opens the CAN; `None` at the second call, or if the controller does not answer.
+    fn open_can() -> Option<Self::Bus>;
+
+    /// Moves frames between controller and rings, in one of the interrupts.
+    fn can_interrupt();
 }
 
 /// The board cannot start its PWM.

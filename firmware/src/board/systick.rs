@@ -2,11 +2,11 @@
 
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 
-/// Calls the SysTick exception every `period` clocks of the core, 2 to 65535, the first time in one
+/// Calls the SysTick exception every `clocks` clocks of the core, 2 to 2^24, the first time in one
 /// period from now.
-pub fn start(timer: &mut SYST, period: u16) {
+pub fn start(timer: &mut SYST, clocks: u32) {
     timer.set_clock_source(SystClkSource::Core);
-    timer.set_reload(u32::from(period) - 1);
+    timer.set_reload(clocks - 1);
     timer.clear_current();
     timer.enable_interrupt();
     timer.enable_counter();

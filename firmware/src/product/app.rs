@@ -1,18 +1,19 @@
 //! From the reset to the running tasks, or to a safe state that reports why there are none.
 
+use super::bus::{self, ProductBus};
 use super::diagnosis::{Diagnosis, Start};
 use super::interrupts::{self, ControlInterrupt, PwmInterrupt};
-use super::uart::{self, Uart};
 use super::{configuration, history};
 use crate::board::{Board, Current};
 use crate::fault::{Fault, enter_safe_state};
 use crate::refusal::log_invalid_scenario;
 use crate::{stack, steering, tasks};
 use shared_model::Scenario;
-use shared_model::bus::{Bus, Message, SerialBus};
+use shared_model::bus::{Bus, Message};
 use shared_model::configuration::ConfigurationError;
 use shared_model::diagnostic::{FAULTS_IN_A_ROW, History, ResetCause};
 use shared_model::ecu::Ecu;
+use shared_model::independent_clock::ClockCheck;
 use shared_model::signal::Mode;
 
 /// The watchdog bites when no control tick comes for this many control periods, or for this long,
@@ -32,7 +33,7 @@ pub fn run() -> ! {
     Current::disable_bridge();
     let reset_cause = Current::reset_cause();
     let history = begin(reset_cause);
-    let Some(uart) = uart::open() else {
+    let Some(bus) = bus::open() else {
         stay_neutral()
     };
     let mut start = Start {
@@ -50,7 +51,7 @@ pub fn run() -> ! {
             "{=u32} faults in a row: safe state until power-on",
             history.faults_in_a_row
         );
-        stay_safe(uart, start);
+        stay_safe(bus, start);
     }
     let program = configuration::read().and_then(|scenario| {
         let ecu = Ecu::new(&scenario, Current::COST_CLOCK_HZ);
@@ -58,14 +59,14 @@ pub fn run() -> ! {
         Ok((scenario, ecu))
     });
     match program {
-        Ok((scenario, ecu)) => steer(&scenario, ecu, uart, start),
+        Ok((scenario, ecu)) => steer(&scenario, ecu, bus, start),
         Err(error) => {
             defmt::error!("configuration refused: {=str}", error.reason());
             if let ConfigurationError::Invalid(reason) = &error {
                 log_invalid_scenario(reason);
             }
             start.configuration = error.code();
-            stay_safe(uart, start)
+            stay_safe(bus, start)
         }
     }
 }
@@ -82,22 +83,28 @@ fn begin(reset_cause: ResetCause) -> History {
 }
 
 /// Starts the tasks, and feeds the watchdog as long as they run.
-fn steer(scenario: &Scenario<f32>, ecu: Ecu<f32>, uart: Uart, start: Start) -> ! {
+fn steer(scenario: &Scenario<f32>, ecu: Ecu<f32>, bus: ProductBus, start: Start) -> ! {
     let period = ecu.pwm.neutral().period();
     let rate_hz = scenario.run.control_rate_hz;
     let samples_per_ms = (scenario.run.pwm_rate_hz / 1000.0) as u32;
     let timeout_ms = (WATCHDOG_PERIODS * 1000.0 / rate_hz) as u32;
     let diagnosis_ticks = ((DIAGNOSIS_S * rate_hz) as u32).max(1);
+    Current::start_independent_counter();
     let started = critical_section::with(|_| {
         let (pin, bridge) = Current::start_pwm(period).ok()?;
         tasks::set_priorities();
         let pwm = cortex_m::singleton!(: PwmInterrupt = PwmInterrupt {
             steering: steering::Pwm { task: ecu.pwm, pin, bridge },
             last_tick_counts: Current::cost_counter(),
+            clock_check: ClockCheck::new(
+                &Current::INDEPENDENT_CLOCK,
+                rate_hz,
+                scenario.gate.tick_tolerance,
+            ),
         })?;
         let control = cortex_m::singleton!(: ControlInterrupt = ControlInterrupt {
             steering: steering::Control { task: ecu.control },
-            bus: SerialBus::new(uart),
+            bus,
             frame: None,
             diagnosis: Diagnosis::new(start),
             diagnosis_ticks,
@@ -149,18 +156,17 @@ fn forget_faults_in_a_row() {
 }
 
 /// Bridge off, PWM neutral, and a diagnostic frame every tenth of a second.
-fn stay_safe(uart: Uart, start: Start) -> ! {
+fn stay_safe(mut bus: ProductBus, start: Start) -> ! {
     let period = (Current::TIMER_CLOCK_HZ / NEUTRAL_PWM_HZ) as u16;
     // Its interrupt finds no task. Where the PWM does not start, its pin is off.
     let _ = Current::start_pwm(period);
     Current::stop_pwm_interrupt();
     Current::neutralise_pwm();
     Current::disable_bridge();
-    let mut bus = SerialBus::new(uart);
     let mut diagnosis = Diagnosis::new(start);
     loop {
         let _ = bus.send(Message::Diagnostic, &diagnosis.frame(0));
-        cortex_m::asm::delay(Current::TIMER_CLOCK_HZ / 10);
+        cortex_m::asm::delay(Current::CORE_CLOCK_HZ / 10);
     }
 }
 

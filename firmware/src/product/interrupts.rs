@@ -1,8 +1,8 @@
 //! The two tasks in their interrupts. Nothing here can panic: the binary `panic-free` proves it at
 //! link time.
 
+use super::bus::ProductBus;
 use super::diagnosis::Diagnosis;
-use super::uart::Uart;
 use crate::board::{Board, Current};
 use crate::{clock, steering, tasks};
 use core::arch::naked_asm;
@@ -10,10 +10,14 @@ use core::cell::Cell;
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
 use critical_section::Mutex;
-use shared_model::bus::{Bus, Message, SerialBus, latest};
+use shared_model::bus::{Bus, Message, latest};
 use shared_model::ecu::ControlInput;
 use shared_model::exchange::FrameBytes;
+use shared_model::independent_clock::ClockCheck;
 use shared_model::signal::Mode;
+
+/// Time of a tick that is in no window of the gate, counts.
+const NOT_IN_TIME: u32 = 0;
 
 static PWM_START: Mutex<Cell<Option<&'static mut PwmInterrupt>>> = Mutex::new(Cell::new(None));
 static CONTROL_START: Mutex<Cell<Option<&'static mut ControlInterrupt>>> =
@@ -25,8 +29,10 @@ static MODE: AtomicU8 = AtomicU8::new(Mode::Starting as u8);
 pub struct PwmInterrupt {
     /// The program and the servo's PWM.
     pub steering: steering::Pwm,
-    /// The independent clock at the last control tick, counts.
+    /// The cost counter at the last control tick.
     pub last_tick_counts: u32,
+    /// The check by the independent clock.
+    pub clock_check: ClockCheck,
 }
 
 /// State of the control interrupt, which has the bus to itself.
@@ -34,7 +40,7 @@ pub struct ControlInterrupt {
     /// The program.
     pub steering: steering::Control,
     /// The bus.
-    pub bus: SerialBus<Uart>,
+    pub bus: ProductBus,
     /// Frame of the last control tick: the vehicle gets it when it takes effect.
     pub frame: Option<FrameBytes>,
     /// Diagnostic frames.
@@ -53,6 +59,9 @@ impl PwmInterrupt {
             let now = Current::cost_counter();
             let elapsed_counts = now.wrapping_sub(self.last_tick_counts);
             self.last_tick_counts = now;
+            let in_time = self.clock_check.tick(Current::independent_counter());
+            // The gate's own fault for a tick that is not in its window.
+            let elapsed_counts = if in_time { elapsed_counts } else { NOT_IN_TIME };
             self.steering.call_control(None, elapsed_counts);
         }
     }

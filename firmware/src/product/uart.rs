@@ -1,12 +1,14 @@
 //! The UART's bytes: rings between its interrupt and the control task. Nothing here waits.
 
 use crate::board::{Board, Current};
+use crate::nvic;
 use core::cell::Cell;
-use cortex_m::interrupt::InterruptNumber;
-use cortex_m::peripheral::NVIC;
 use critical_section::Mutex;
 use heapless::spsc::{Consumer, Producer, Queue};
-use shared_model::bus::{Busy, SerialLine};
+use shared_model::bus::{Busy, SerialBus, SerialLine};
+
+/// The bus.
+pub type ProductBus = SerialBus<Uart>;
 
 /// Received bytes on their way: 2.5 ms of a full line of 1 Mbit/s.
 const RECEIVE_RING: usize = 256;
@@ -26,17 +28,6 @@ struct Ends {
 
 static ENDS: Mutex<Cell<Option<Ends>>> = Mutex::new(Cell::new(None));
 
-/// The number of a board's interrupt.
-#[derive(Clone, Copy)]
-struct Number(u16);
-
-// SAFETY: boards give numbers that their chip has.
-unsafe impl InterruptNumber for Number {
-    fn number(self) -> u16 {
-        self.0
-    }
-}
-
 /// The control task's end of the line.
 pub struct Uart {
     received: Consumer<'static, u8, RECEIVE_RING>,
@@ -44,33 +35,23 @@ pub struct Uart {
 }
 
 /// Opens the UART; `None` at the second call.
-pub fn open() -> Option<Uart> {
+pub fn open() -> Option<ProductBus> {
     let receive = cortex_m::singleton!(: Queue<u8, RECEIVE_RING> = Queue::new())?;
     let send = cortex_m::singleton!(: Queue<u8, SEND_RING> = Queue::new())?;
     let (received, receiver) = receive.split();
     let (sender, to_send) = send.split();
     critical_section::with(|cs| ENDS.borrow(cs).set(Some(Ends { received, to_send })));
     Current::open_uart();
-    for &number in Current::UART_INTERRUPTS {
-        // SAFETY: called once; the handler is `interrupt`, whose state is in its place. Not by the
-        // crate's own way to the peripherals, which then are taken, and the board could not have
-        // them.
-        unsafe {
-            if let Some(priority) = (*NVIC::PTR).ipr.get(usize::from(number)) {
-                priority.write(PRIORITY);
-            }
-            NVIC::unmask(Number(number));
-        }
-    }
-    Some(Uart {
+    nvic::unmask(Current::UART_INTERRUPTS, PRIORITY);
+    Some(SerialBus::new(Uart {
         received: receiver,
         to_send: sender,
-    })
+    }))
 }
 
 /// The UART's interrupt, if `number` is one.
 pub fn interrupt(number: i16) -> bool {
-    let is_uart = u16::try_from(number).is_ok_and(|it| Current::UART_INTERRUPTS.contains(&it));
+    let is_uart = nvic::is_one_of(number, Current::UART_INTERRUPTS);
     if is_uart {
         // By taking them out and putting them back: nothing else has them meanwhile.
         if let Some(mut ends) = critical_section::with(|cs| ENDS.borrow(cs).take()) {
@@ -117,9 +98,7 @@ impl SerialLine for Uart {
             // There is room, as seen above: only the interrupt changes it, and it makes more.
             let _ = self.to_send.enqueue(byte);
         }
-        if let Some(&number) = Current::UART_INTERRUPTS.first() {
-            NVIC::pend(Number(number));
-        }
+        nvic::pend(Current::UART_INTERRUPTS);
         Ok(())
     }
 }

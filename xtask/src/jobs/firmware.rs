@@ -9,7 +9,7 @@ use crate::{firmware, rustup, setup};
 const ALL: &str = "all";
 
 /// Builds the firmware's programs for `board`, or for all boards, and prints the path of each
-/// bench image.
+/// bench image. A board with a CAN has `ecu-can` beside it.
 pub fn run(board: &str) -> Result<()> {
     let known = firmware::boards()?;
     let chosen: Vec<&str> = match known.iter().find(|known| *known == board) {
@@ -26,6 +26,11 @@ pub fn run(board: &str) -> Result<()> {
         )
     })?;
     for board in &chosen {
+        if firmware::has_can(board) {
+            stage(&format!("firmware with CAN for {board}"), || {
+                firmware::build_can(&toolchain, board)
+            })?;
+        }
         stage(&format!("firmware for {board}"), || {
             firmware::build(&toolchain, board, &["--bins"])
         })?;

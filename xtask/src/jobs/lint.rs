@@ -23,7 +23,15 @@ pub fn run() -> Result<()> {
     }
     for board in firmware::boards()? {
         stage(&format!("clippy on the firmware for {board}"), || {
-            firmware(&pinned, &board)
+            firmware(&pinned, &board)?;
+            if firmware::has_can(&board) {
+                clippy(
+                    firmware::cargo(&pinned, "clippy", &board)?
+                        .args(["--bin", "ecu"])
+                        .args(firmware::CAN),
+                )?;
+            }
+            Ok(())
         })?;
     }
     println!("passed: format, clippy on host and firmware");

@@ -8,6 +8,7 @@ use crate::{firmware, process, rustup, setup, workspace};
 
 /// The undefined function that the linker reports where a panic is reachable.
 const MISSING_FUNCTION: &str = "a_panic_is_reachable_from_the_control_path";
+const NOT_LINKED: &str = "`panic-free` did not build; a missing function in the linker's message means that a panic can be reached";
 /// The tests that compare with tests/golden.
 const TESTS: [&str; 8] = [
     "test",
@@ -46,6 +47,15 @@ pub fn run(overwrite_expected: bool) -> Result<()> {
 /// Every board's images, and the panic-free proof with them.
 pub fn build(toolchain: &str) -> Result<()> {
     for board in firmware::boards()? {
+        if firmware::has_can(&board) {
+            stage(
+                &format!("CAN, with its panic-free proof, for {board}"),
+                || {
+                    let built = firmware::build_can(toolchain, &board);
+                    built.context(Exit::failed(NOT_LINKED))
+                },
+            )?;
+        }
         stage(&format!("firmware for {board}"), || {
             firmware::build(toolchain, &board, &["--bin", "ecu", "--bin", "bench"])
         })?;
@@ -60,7 +70,7 @@ pub fn build(toolchain: &str) -> Result<()> {
 fn prove_panic_free(toolchain: &str, board: &str) -> Result<()> {
     println!("   the link is the proof: it fails if a panic can be reached from the control path");
     let all = firmware::build(toolchain, board, &["--bins"]);
-    all.context(Exit::failed("`panic-free` did not build; a missing function in the linker's message means that a panic can be reached"))?;
+    all.context(Exit::failed(NOT_LINKED))?;
     println!("   panic-free linked: no panic can be reached");
 
     // A proof that cannot fail is none: with a panic put into the path, the link must miss the

@@ -10,6 +10,7 @@ use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 use embedded_hal::digital::{self, OutputPin};
 use embedded_hal::pwm::{ErrorType, SetDutyCycle};
 use shared_model::diagnostic::ResetCause;
+use shared_model::independent_clock::IndependentClock;
 
 /// Clock of the core, SysTick and the APB timers, Hz.
 const CLOCK_HZ: u32 = 25_000_000;
@@ -23,6 +24,10 @@ const INSTRUCTION_RATE_HZ: u32 = 31_250_000;
 const TIMER0_CTRL: *mut u32 = 0x4000_0000 as *mut u32;
 const TIMER0_VALUE: *mut u32 = 0x4000_0004 as *mut u32;
 const TIMER0_RELOAD: *mut u32 = 0x4000_0008 as *mut u32;
+/// CMSDK APB timer 1.
+const TIMER1_CTRL: *mut u32 = 0x4000_1000 as *mut u32;
+const TIMER1_VALUE: *mut u32 = 0x4000_1004 as *mut u32;
+const TIMER1_RELOAD: *mut u32 = 0x4000_1008 as *mut u32;
 /// CMSDK watchdog: load, control, interrupt-clear and lock registers.
 const WATCHDOG_LOAD: *mut u32 = 0x4000_8000 as *mut u32;
 const WATCHDOG_CTRL: *mut u32 = 0x4000_8008 as *mut u32;
@@ -133,6 +138,13 @@ impl Board for Mps2 {
     const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
     const COST_CLOCK_HZ: u32 = CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = INSTRUCTION_RATE_HZ;
+    /// In the emulator all clocks are one.
+    const INDEPENDENT_CLOCK: IndependentClock = IndependentClock {
+        nominal_hz: CLOCK_HZ,
+        least_hz: CLOCK_HZ,
+        most_hz: CLOCK_HZ,
+        bits: 32,
+    };
     const UART_INTERRUPTS: &[u16] = &UART_INTERRUPTS;
 
     /// The emulator does not report it.
@@ -151,7 +163,7 @@ impl Board for Mps2 {
             write_volatile(TIMER0_VALUE, u32::MAX);
             write_volatile(TIMER0_CTRL, 1);
         }
-        systick::start(&mut core.SYST, period);
+        systick::start(&mut core.SYST, period.into());
         Ok((VirtualPwm { period }, VirtualBridge))
     }
 
@@ -174,6 +186,20 @@ impl Board for Mps2 {
     fn cost_counter() -> u32 {
         // SAFETY: a read of the timer's value register, without side effect.
         unsafe { u32::MAX - read_volatile(TIMER0_VALUE) }
+    }
+
+    fn start_independent_counter() {
+        // SAFETY: writes to registers of the timer, which nothing else uses.
+        unsafe {
+            write_volatile(TIMER1_RELOAD, u32::MAX);
+            write_volatile(TIMER1_VALUE, u32::MAX);
+            write_volatile(TIMER1_CTRL, 1);
+        }
+    }
+
+    fn independent_counter() -> u32 {
+        // SAFETY: a read of the timer's value register, without side effect.
+        unsafe { u32::MAX - read_volatile(TIMER1_VALUE) }
     }
 
     fn start_watchdog(timeout_ms: u32) {

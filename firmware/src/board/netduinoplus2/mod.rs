@@ -1,7 +1,7 @@
 //! Netduino Plus 2: STM32F405 (Cortex-M4F), on silicon and as QEMU emulates it.
 //!
 //! TIM3's first channel, on pin PA6, is the servo's PWM, PA7 enables its bridge. TIM2 counts the cost
-//! of the tasks. USART1, on PB6 and PB7, is the bus. All clocks are the 16 MHz of the internal oscillator, which the
+//! of the tasks. USART1, on PB6 and PB7, is the bus, or CAN1, on PB8 and PB9. All clocks are the 16 MHz of the internal oscillator, which the
 //! chip has after a reset: the emulator has no clock controller, so a program that waits for the
 //! crystal or the PLL waits for ever.
 //!
@@ -12,9 +12,14 @@
 //! | watchdog | resets the chip | not there: it reads 0 and never bites |
 //! | cost | cycles, as the timer has the core's clock | virtual time |
 
+#[cfg(feature = "can")]
+mod can;
+mod rtc;
+
 use super::{Board, BoardError, systick};
 use fugit::TimerDurationU32;
 use shared_model::diagnostic::ResetCause;
+use shared_model::independent_clock::IndependentClock;
 use stm32f4xx_hal::gpio::{Output, PA7, PushPull};
 use stm32f4xx_hal::pac;
 use stm32f4xx_hal::prelude::*;
@@ -58,6 +63,13 @@ impl Board for NetduinoPlus2 {
     // The reports count instructions in the emulator. On silicon: CLOCK_HZ and 0.
     const COST_CLOCK_HZ: u32 = emulated::COST_CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = emulated::PROGRAM_INSTRUCTION_RATE_HZ;
+    /// The sub-seconds of the RTC with the low-speed oscillator, LSI. QEMU has neither.
+    const INDEPENDENT_CLOCK: IndependentClock = IndependentClock {
+        nominal_hz: 32_000,
+        least_hz: 17_000,
+        most_hz: 47_000,
+        bits: 15,
+    };
     const UART_INTERRUPTS: &[u16] = &[pac::Interrupt::USART1 as u16];
 
     fn reset_cause() -> ResetCause {
@@ -96,7 +108,7 @@ impl Board for NetduinoPlus2 {
         pwm.enable();
         // Right after the restart of the period, so that the interrupt writes a duty early in a
         // period and it is taken over at that period's end, never ambiguous between two.
-        systick::start(&mut core.SYST, period);
+        systick::start(&mut core.SYST, period.into());
         Ok((pwm, pins.pa7.into_push_pull_output()))
     }
 
@@ -126,6 +138,14 @@ impl Board for NetduinoPlus2 {
     fn cost_counter() -> u32 {
         // SAFETY: a read of the counter, without side effect.
         unsafe { (*pac::TIM2::ptr()).cnt().read().cnt().bits() }
+    }
+
+    fn start_independent_counter() {
+        rtc::start();
+    }
+
+    fn independent_counter() -> u32 {
+        rtc::counter()
     }
 
     fn start_watchdog(timeout_ms: u32) {

@@ -2,11 +2,15 @@
 //! has this chip.
 //!
 //! TIM3's first channel, on pin PA6, is the servo's PWM, PA7 enables its bridge. TIM2 counts the cost
-//! of the tasks. USART1, on PC4 and PC5, is the bus. All clocks are the 16 MHz of the internal oscillator, which the
+//! of the tasks. USART1, on PC4 and PC5, is the bus, or FDCAN1, on PB8 and PB9. All clocks are the 16 MHz of the internal oscillator, which the
 //! chip has after a reset.
+
+#[cfg(feature = "can")]
+mod can;
 
 use super::{Board, BoardError, systick};
 use shared_model::diagnostic::ResetCause;
+use shared_model::independent_clock::IndependentClock;
 use stm32g4xx_hal::gpio::{AF2, Output, PA6, PA7, PushPull};
 use stm32g4xx_hal::independent_watchdog::IndependentWatchdog;
 use stm32g4xx_hal::prelude::*;
@@ -36,6 +40,13 @@ impl Board for NucleoG474re {
     const TIMER_CLOCK_HZ: u32 = CLOCK_HZ;
     const COST_CLOCK_HZ: u32 = CLOCK_HZ;
     const INSTRUCTION_RATE_HZ: u32 = 0;
+    /// LPTIM1 with the low-speed oscillator, LSI.
+    const INDEPENDENT_CLOCK: IndependentClock = IndependentClock {
+        nominal_hz: 32_000,
+        least_hz: 29_500,
+        most_hz: 34_000,
+        bits: 16,
+    };
     const UART_INTERRUPTS: &[u16] = &[pac::Interrupt::USART1 as u16];
 
     fn reset_cause() -> ResetCause {
@@ -75,7 +86,7 @@ impl Board for NucleoG474re {
         pwm.enable();
         // Right after the restart of the period, so that the interrupt writes a duty early in a
         // period and it is taken over at that period's end, never ambiguous between two.
-        systick::start(&mut core.SYST, period);
+        systick::start(&mut core.SYST, period.into());
         Ok((pwm, pins.pa7.into_push_pull_output()))
     }
 
@@ -108,6 +119,31 @@ impl Board for NucleoG474re {
     fn cost_counter() -> u32 {
         // SAFETY: a read of the counter, without side effect.
         unsafe { (*pac::TIM2::ptr()).cnt().read().bits() }
+    }
+
+    fn start_independent_counter() {
+        // SAFETY: the low-power timer is used by nothing else, and the clocks by nothing that runs
+        // at the same time.
+        let (rcc, timer) = unsafe { (&*pac::RCC::ptr(), &*pac::LPTIMER1::ptr()) };
+        rcc.csr().modify(|_, w| w.lsion().set_bit());
+        rcc.apb1enr1().modify(|_, w| w.lptim1en().set_bit());
+        rcc.ccipr().modify(|_, w| w.lptim1sel().lsi());
+        // SAFETY: values that the registers take: no prescaler, on, the greatest period, started.
+        unsafe {
+            timer.cfgr().write(|w| w.bits(0));
+            timer.cr().write(|w| w.bits(0b001));
+            timer.arr().write(|w| w.bits(0xFFFF));
+            timer.cr().write(|w| w.bits(0b101));
+        }
+    }
+
+    fn independent_counter() -> u32 {
+        // SAFETY: reads of the counter, without side effect.
+        let timer = unsafe { &*pac::LPTIMER1::ptr() };
+        // Its clock is another: a count is right if two reads are equal.
+        let read = || timer.cnt().read().bits() & 0xFFFF;
+        let (first, second) = (read(), read());
+        if first == second { first } else { read() }
     }
 
     fn start_watchdog(timeout_ms: u32) {

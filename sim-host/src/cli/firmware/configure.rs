@@ -61,9 +61,10 @@ pub struct Arguments {
 }
 
 /// The boards, and the clock of their PWM timers, Hz.
-const BOARDS: [(&str, f64); 3] = [
+const BOARDS: [(&str, f64); 4] = [
     ("mps2", 25e6),
     ("netduinoplus2", 16e6),
+    ("nrf52840dk", 16e6),
     ("nucleog474re", 16e6),
 ];
 
