@@ -39,9 +39,8 @@ pub struct Challenger {
     number: u8,
     /// Number of challenges since the start, up to [`MAX_AGE_TICKS`](Self::MAX_AGE_TICKS).
     sent: u8,
-    /// Nibbles of the last 16 challenges, the last in the low bits of the first word. Two words: a
-    /// shift of 64 bits takes a dozen instructions of the target.
-    nibbles: [u32; 2],
+    /// Nibbles of the last 16 challenges, the last in the low bits.
+    nibbles: u64,
 }
 
 impl Challenger {
@@ -54,7 +53,7 @@ impl Challenger {
             generator: SEED,
             number: 0,
             sent: 0,
-            nibbles: [0; 2],
+            nibbles: 0,
         }
     }
 
@@ -64,11 +63,7 @@ impl Challenger {
         self.generator ^= self.generator >> 17;
         self.generator ^= self.generator << 5;
         let nibble = (self.generator >> (u32::BITS - NIBBLE_BITS)) as u8;
-        let [recent, older] = self.nibbles;
-        self.nibbles = [
-            recent << NIBBLE_BITS | u32::from(nibble),
-            older << NIBBLE_BITS | recent >> (u32::BITS - NIBBLE_BITS),
-        ];
+        self.nibbles = self.nibbles << NIBBLE_BITS | u64::from(nibble);
         self.number = self.number.wrapping_add(1) & NIBBLE;
         self.sent = self.sent.saturating_add(1).min(Self::MAX_AGE_TICKS as u8);
         nibble << NIBBLE_BITS | self.number
@@ -80,9 +75,7 @@ impl Challenger {
         // The last challenge is one tick old in the tick that checks its echo.
         let age = self.number.wrapping_add(1).wrapping_sub(echo) & NIBBLE;
         let behind = u32::from(age.wrapping_sub(1) & NIBBLE);
-        let [recent, older] = self.nibbles;
-        let word = if behind < 8 { recent } else { older };
-        let sent = word.wrapping_shr(NIBBLE_BITS * behind) as u8 & NIBBLE;
+        let sent = (self.nibbles >> (NIBBLE_BITS * behind)) as u8 & NIBBLE;
         let is_known = age >= 1 && age <= self.sent && sent == echo >> NIBBLE_BITS;
         is_known.then_some(age.into())
     }
