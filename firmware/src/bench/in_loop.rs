@@ -2,7 +2,8 @@
 //! it, and the host moves the vehicle in between.
 
 use super::exit::{self, ExitCode};
-use super::link::{Link, Pace};
+use super::link::Link;
+use super::pace::{self, Pace};
 use super::{counters, run_state};
 use crate::board::{Board, Current};
 use crate::steering;
@@ -49,7 +50,8 @@ impl PwmInterrupt {
             },
             control_cost: CONTROL_COST.load(Ordering::Relaxed),
         };
-        let Ok(received) = counters::uncounted(|| self.link.exchange(&sent)) else {
+        let due = begun.control_due;
+        let Ok(received) = counters::uncounted(|| self.link.exchange(&sent, due)) else {
             exit::end_safely(ExitCode::LinkLost);
         };
         if received.stop {
@@ -61,6 +63,7 @@ impl PwmInterrupt {
         if begun.control_due {
             self.call_control();
         }
+        pace::end_period(begun.control_due);
     }
 
     fn call_control(&mut self) {

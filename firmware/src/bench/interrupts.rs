@@ -69,17 +69,22 @@ pub fn hand_over(pwm: PwmInterrupt, control: ControlInterrupt, samples_per_ms: u
 /// The PWM interrupt; `interrupt` is its own.
 #[inline]
 pub fn pwm(interrupt: &mut Option<PwmInterrupt>) {
-    let start = Current::cost_counter();
+    let start = counters::pwm_start();
     if interrupt.is_none() {
         *interrupt = critical_section::with(|cs| PWM_START.borrow(cs).take());
     }
-    jitter::record(clock::count_sample(), start);
+    let index = clock::count_sample();
+    if let Some(start) = start {
+        jitter::record(index, start);
+    }
     match interrupt {
         Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),
         None => {}
     }
-    counters::record_pwm_cost(start);
+    if let Some(start) = start {
+        counters::record_pwm_cost(start);
+    }
 }
 
 /// The control interrupt; `interrupt` is its own.

@@ -42,7 +42,12 @@ pub(crate) fn read_exact(
     Ok(())
 }
 
-fn read_some(file: &mut File, limit: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
+/// Reads at least one byte into `bytes`, waiting at most `limit`.
+pub(crate) fn read_some(
+    file: &mut File,
+    limit: Duration,
+    bytes: &mut [u8],
+) -> std::io::Result<usize> {
     wait_until_ready(file, PollFlags::IN, limit)?;
     match file.read(bytes)? {
         0 => Err(ErrorKind::UnexpectedEof.into()),
