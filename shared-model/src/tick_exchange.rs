@@ -1,4 +1,4 @@
-//! The exchange once per control tick: the duty codes of all its PWM periods in one message.
+//! The exchange once per control tick: duty codes and bridge of all its PWM periods in one message.
 //!
 //! The duty that is captured on the servo's pin is then the ECU's own, so this exchange has no
 //! faults behind the pin; the one per PWM period (module `exchange`) has. A tick has at most
@@ -9,7 +9,7 @@
 //! | 2 | number of PWM periods |
 //! | 1 + 24 | "a frame follows", actuator frame (zeros without one) |
 //! | 2 + 2 | cost of the PWM task, cost of the control task |
-//! | 2 per period | duty code |
+//! | 2 + 1 per period | duty code, "the bridge is on" |
 
 use crate::MAX_RATIO;
 use crate::exchange::{FRAME_LEN, FrameBytes, Packet, ToHost};
@@ -18,7 +18,7 @@ const FRAME_AT: usize = 2;
 const COSTS_AT: usize = FRAME_AT + 1 + FRAME_LEN;
 const PERIODS_AT: usize = COSTS_AT + 2 + 2;
 /// Bytes of a PWM period.
-const PERIOD_LEN: usize = 2;
+const PERIOD_LEN: usize = 2 + 1;
 /// Longest message of the ECU, bytes.
 pub const MAX_TICK_TO_HOST_LEN: usize = PERIODS_AT + PERIOD_LEN * MAX_RATIO as usize;
 /// Length of the message to the ECU, bytes: "a frame follows", sensor frame, "the run is over".
@@ -43,8 +43,8 @@ impl TickToHost {
     /// Adds a PWM period before the last of its tick. Periods beyond [`MAX_RATIO`] are dropped.
     pub fn push(&mut self, packet: &Packet) {
         let [low, high] = packet.duty_code.to_le_bytes();
-        if let Some([a, b]) = self.bytes.get_mut(self.length..self.length + PERIOD_LEN) {
-            (*a, *b) = (low, high);
+        if let Some([a, b, bridge_on]) = self.bytes.get_mut(self.length..self.length + PERIOD_LEN) {
+            (*a, *b, *bridge_on) = (low, high, packet.bridge_on.into());
             self.length += PERIOD_LEN;
         }
     }
@@ -77,8 +77,8 @@ impl TickToHost {
     /// ```
     /// use shared_model::exchange::{Packet, ToHost};
     /// use shared_model::tick_exchange::TickToHost;
-    /// let first = Packet { duty_code: 1250, frame: None };
-    /// let last = Packet { duty_code: 1251, frame: Some([7; 24]) };
+    /// let first = Packet { duty_code: 1250, bridge_on: true, frame: None };
+    /// let last = Packet { duty_code: 1251, bridge_on: false, frame: Some([7; 24]) };
     /// let mut tick = TickToHost::new();
     /// tick.push(&first);
     /// let last = ToHost { packet: last, pwm_cost: 3, control_cost: 4 };
@@ -97,17 +97,21 @@ impl TickToHost {
         let number = move |at: usize| u16::from_le_bytes([byte(at), byte(at + 1)]);
         let frame = (byte(FRAME_AT) != 0).then(|| core::array::from_fn(|i| byte(FRAME_AT + 1 + i)));
         let (pwm_cost, control_cost) = (number(COSTS_AT), number(COSTS_AT + 2));
-        codes.iter().enumerate().map(move |(index, code)| {
-            let is_last = index + 1 == codes.len();
-            ToHost {
-                packet: Packet {
-                    duty_code: u16::from_le_bytes(*code),
-                    frame: frame.filter(|_| is_last),
-                },
-                pwm_cost: if is_last { pwm_cost } else { 0 },
-                control_cost: if is_last { control_cost } else { 0 },
-            }
-        })
+        codes
+            .iter()
+            .enumerate()
+            .map(move |(index, &[low, high, bridge_on])| {
+                let is_last = index + 1 == codes.len();
+                ToHost {
+                    packet: Packet {
+                        duty_code: u16::from_le_bytes([low, high]),
+                        bridge_on: bridge_on != 0,
+                        frame: frame.filter(|_| is_last),
+                    },
+                    pwm_cost: if is_last { pwm_cost } else { 0 },
+                    control_cost: if is_last { control_cost } else { 0 },
+                }
+            })
     }
 }
 

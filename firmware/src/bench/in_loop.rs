@@ -67,12 +67,13 @@ impl PwmInterrupt {
     }
 
     fn call_control(&mut self) {
-        let now = Current::cost_counter();
         let elapsed_counts = match self.link.pace {
             Pace::Host => self.nominal_counts,
-            Pace::Timer => now.wrapping_sub(self.last_tick_counts),
+            Pace::Timer => {
+                let now = Current::cost_counter();
+                now.wrapping_sub(core::mem::replace(&mut self.last_tick_counts, now))
+            }
         };
-        self.last_tick_counts = now;
         self.steering
             .call_control(self.frame.take(), elapsed_counts);
     }
