@@ -100,7 +100,7 @@ fn run_open_loop(
     if pace == Pace::Host {
         counters::leave_pwm_unmeasured();
     }
-    interrupts::start(period, scenario, scenario.step_s(), |(pwm, _)| {
+    interrupts::start(period, scenario, scenario.step_s(), pace, |(pwm, _)| {
         let pwm = cortex_m::singleton!(: open_loop::PwmInterrupt = open_loop::PwmInterrupt {
             task,
             pwm,
@@ -118,7 +118,6 @@ fn run_open_loop(
         ))
     });
 
-    pace.set();
     while !run_state::is_finished() {
         let is_taken = recorder.take_one()?;
         if is_taken {
@@ -141,7 +140,7 @@ fn run_in_loop(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode 
     let period = ecu.pwm.neutral().period();
     let tick_s = 1.0 / scenario.run.control_rate_hz;
     let pace = link.pace;
-    interrupts::start(period, scenario, tick_s, |(pin, bridge)| {
+    interrupts::start(period, scenario, tick_s, pace, |(pin, bridge)| {
         let pwm = in_loop::place_pwm(in_loop::PwmInterrupt {
             steering: steering::Pwm {
                 task: ecu.pwm,
@@ -158,7 +157,6 @@ fn run_in_loop(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode 
         })?;
         Some((PwmInterrupt::InLoop(pwm), ControlInterrupt::InLoop(control)))
     });
-    pace.set();
     let mut ticks_seen = 0;
     while !run_state::is_finished() {
         let ticks = steering::control_ticks();

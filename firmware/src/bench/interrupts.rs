@@ -1,6 +1,7 @@
 //! The two tasks as interrupts, whichever program runs in them. Nothing here can panic: the binary
 //! `panic-free` proves it at link time.
 
+use super::pace::Pace;
 use super::{counters, in_loop, jitter, open_loop};
 use crate::board::{Board, Current};
 use crate::{clock, tasks};
@@ -37,11 +38,12 @@ pub enum ControlInterrupt {
 type Servo = (<Current as Board>::Pwm, <Current as Board>::Bridge);
 
 /// Starts PWM, interrupts and watchdog; `tasks` makes the tasks of the two interrupts. The control
-/// task runs every `tick_s`.
+/// task runs every `tick_s`. At the host's pace the timer never calls the PWM interrupt.
 pub fn start(
     period: u16,
     scenario: &Scenario<f32>,
     tick_s: f32,
+    pace: Pace,
     tasks: impl FnOnce(Servo) -> Option<(PwmInterrupt, ControlInterrupt)>,
 ) {
     let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * tick_s) as u32;
@@ -52,6 +54,7 @@ pub fn start(
         if let Some((pwm, control)) = pwm.and_then(tasks) {
             hand_over(pwm, control, samples_per_ms);
         }
+        pace.set();
         tasks::set_priorities();
         Current::start_watchdog(timeout_ms.max(WATCHDOG_LEAST_MS));
     });

@@ -34,10 +34,12 @@ impl Pace {
 }
 
 impl Pace {
-    /// Sets the pace of the PWM interrupt, after its timer is started.
+    /// Sets the pace of the PWM interrupt. For use after its timer is started, inside the same critical
+    /// section: a timer that is faster than the task would leave no time to stop it.
     pub fn set(self) {
         if self == Self::Host {
             Current::stop_pwm_interrupt();
+            SCB::clear_pendst();
             IS_HOSTS.store(true, Ordering::Relaxed);
         }
     }
