@@ -95,6 +95,7 @@ fn wait_until_ready(file: &File, flags: PollFlags, limit: Duration) -> std::io::
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_model::exchange::TO_HOST_LEN;
     use std::os::fd::OwnedFd;
 
     #[test]
