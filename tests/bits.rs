@@ -6,20 +6,47 @@ use dynamics::trace::Trace;
 use pil::equivalence::bits;
 use pil::equivalence::trace_of;
 use qemu::Machine;
+use qemu::telemetry::Recording;
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::tire::TireModel;
 use shared_model::vehicle::SlipForm;
-use tests::{record, scenario};
+use tests::{record, record_with, scenario};
 
 fn assert_same_bits(scenario: &Scenario<f32>, machine: Machine) {
-    let firmware = trace_of(&record(scenario, machine, 0));
+    let recording = record(scenario, machine, 0);
+    assert_same_at_host_pace(scenario, machine, &recording);
+    let firmware = trace_of(&recording);
     let host = simulate(scenario).expect("the scenario is valid");
     let bits = bits(&firmware, &host);
     assert_eq!(bits.differing, 0, "{:?} in {scenario:?}", bits.first);
     let words = host.states.len() * 5 + host.duties.len();
     assert_eq!(bits.compared, words + 5, "everything was compared");
+}
+
+/// States and duty codes do not depend on the pace; nor does the end of a run.
+fn assert_same_at_host_pace(scenario: &Scenario<f32>, machine: Machine, timed: &Recording) {
+    let fast = record_with(scenario, machine, 0, &["pace=host"]);
+    let bits = bits(&trace_of(&fast), &trace_of(timed));
+    assert_eq!(bits.differing, 0, "{:?} in {scenario:?}", bits.first);
+    let (end, timed_end) = (&fast.trailer, &timed.trailer);
+    assert_eq!(
+        (end.overruns, end.records, end.final_duty, end.neutral_duty),
+        (
+            0,
+            timed_end.records,
+            timed_end.final_duty,
+            timed_end.neutral_duty
+        )
+    );
+    // The control task is measured, the PWM interrupt is not.
+    assert!(
+        fast.records
+            .iter()
+            .all(|record| record.control_cost > 0 && record.pwm_cost == 0)
+    );
+    assert!(end.min_interval > end.max_interval);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use qemu::session::{LinkKind, Session};
 use qemu::{Machine, RunError};
 use shared_model::Scenario;
-use shared_model::dither::Waveform;
+use shared_model::exchange::ToEcu;
 use shared_model::frame::decode_actuation;
 use shared_model::signal::Mode;
 use std::path::{Path, PathBuf};
@@ -93,10 +93,12 @@ fn every_manoeuvre_gives_the_same_commands_at_every_level() {
             continue;
         }
         let duration_s = if file == "speed-ramp.toml" { 12.0 } else { 5.0 };
-        let runs = run_in_loop(&file, duration_s, Machine::Mps2An386, LinkKind::Files);
-        assert_agree(&runs);
-        assert!(runs.software_processor.duties as f64 >= duration_s * 1e4);
-        assert!(runs.software_processor.frames as f64 >= duration_s * 1e3 - 1.0);
+        for link in [LinkKind::Ticks, LinkKind::Files] {
+            let runs = run_in_loop(&file, duration_s, Machine::Mps2An386, link);
+            assert_agree(&runs);
+            assert!(runs.software_processor.duties as f64 >= duration_s * 1e4);
+            assert!(runs.software_processor.frames as f64 >= duration_s * 1e3 - 1.0);
+        }
         files += 1;
     }
     assert!(files >= 8, "{files} manoeuvres");
@@ -107,6 +109,9 @@ fn every_link_and_board_gives_the_same_commands() {
     let file = "constant-speed-sine.toml";
     for (machine, link) in [
         (Machine::Mps2An386, LinkKind::Timed),
+        (Machine::Mps2An386, LinkKind::MeasuredTicks),
+        (Machine::Mps2An500, LinkKind::Ticks),
+        (Machine::NetduinoPlus2, LinkKind::Ticks),
         (Machine::Mps2An500, LinkKind::Files),
         (Machine::NetduinoPlus2, LinkKind::Files),
     ] {
@@ -114,8 +119,66 @@ fn every_link_and_board_gives_the_same_commands() {
     }
 }
 
+/// Exchanges per control tick and per PWM period are the same exchanges, in the same order.
+#[test]
+fn the_exchanges_do_not_depend_on_the_link() {
+    let per_period = on_target(LinkKind::Files);
+    for link in [LinkKind::Ticks, LinkKind::MeasuredTicks, LinkKind::Timed] {
+        let other = on_target(link);
+        assert_eq!(other.run.exchanges, per_period.run.exchanges, "{link:?}");
+        assert_eq!(other.costs.len(), per_period.costs.len(), "{link:?}");
+        let is_measured = other.costs.iter().skip(1).all(|&(pwm, _)| pwm > 0);
+        assert_eq!(is_measured, link != LinkKind::Ticks, "{link:?}");
+        assert!(other.costs.iter().skip(1).all(|&(_, control)| control > 0));
+    }
+}
+
+/// One period per tick, and many.
+#[test]
+fn a_tick_has_any_allowed_number_of_periods() {
+    for (pwm_rate_hz, control_rate_hz) in [(4000.0, 4000.0), (20_000.0, 100.0)] {
+        let (mut scenario, manoeuvre) = manoeuvre("constant-speed.toml", 0.1);
+        scenario.run.pwm_rate_hz = pwm_rate_hz;
+        scenario.run.control_rate_hz = control_rate_hz;
+        let target = target(Machine::Mps2An386, LinkKind::Ticks);
+        let runs = run_all(&scenario, &manoeuvre, &target, || {});
+        let runs = runs.unwrap_or_else(|error| panic!("{pwm_rate_hz} Hz: {error}"));
+        assert!(
+            runs.agree(),
+            "{pwm_rate_hz} Hz: {:?}",
+            runs.software_processor
+        );
+    }
+}
+
+/// A captured duty other than the ECU's own is an error, not a fault that is ignored.
+#[test]
+fn a_fault_behind_the_pin_needs_an_exchange_per_period() {
+    let (scenario, manoeuvre) = manoeuvre("constant-speed.toml", 0.2);
+    let settings = qemu::settings::of(&ecu_scenario(&scenario, &manoeuvre));
+    let limit = Duration::from_secs(20);
+    let (image, machine) = (image("bench"), Machine::Mps2An386);
+    let session = Session::start(&image, machine, &settings, LinkKind::Ticks, &[], limit);
+    let mut session = session.expect("it starts");
+    let mut packet = session.receive().expect("the first period").packet;
+    packet.duty_code += 1;
+    let error = session.send(&ToEcu {
+        packet,
+        stop: false,
+    });
+    assert!(
+        matches!(error, Err(RunError::CapturedDuty { .. })),
+        "{error:?}"
+    );
+}
+
 #[test]
 fn two_runs_and_a_replay_give_the_same_bytes() {
+    for link in [LinkKind::Ticks, LinkKind::Files] {
+        let (first, second) = (on_target(link), on_target(link));
+        assert_eq!(first.run.exchanges, second.run.exchanges);
+        assert_eq!(first.costs, second.costs);
+    }
     let (first, second) = (on_target(LinkKind::Files), on_target(LinkKind::Files));
     assert_eq!(first.run.exchanges, second.run.exchanges);
     assert_eq!(

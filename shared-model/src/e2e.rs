@@ -32,10 +32,12 @@ impl Sender {
     /// A sender of the frames with that data ID, which must be unique among the frames that could
     /// be confused.
     pub const fn new(data_id: u16) -> Self {
-        Self {
-            data_id,
-            counter: 0,
-        }
+        Self::starting_at(data_id, 0)
+    }
+
+    /// The same, whose first frame has that counter.
+    pub const fn starting_at(data_id: u16, counter: u8) -> Self {
+        Self { data_id, counter }
     }
 
     /// Writes the header: counters from 0 to 255 and again from 0, one more with each frame.

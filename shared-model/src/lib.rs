@@ -39,6 +39,7 @@ pub mod signal;
 pub mod stability;
 pub mod steering;
 pub mod telemetry;
+pub mod tick_exchange;
 pub mod tire;
 pub mod validation;
 pub mod vehicle;

@@ -89,9 +89,23 @@ pub fn run(
 /// # Panics
 /// If the firmware does not end with `exit_code`, or its telemetry is damaged.
 pub fn record(scenario: &Scenario<f32>, machine: Machine, exit_code: i32) -> Recording {
+    record_with(scenario, machine, exit_code, &[])
+}
+
+/// The same, with further settings.
+///
+/// # Panics
+/// As [`record`].
+pub fn record_with(
+    scenario: &Scenario<f32>,
+    machine: Machine,
+    exit_code: i32,
+    more: &[&str],
+) -> Recording {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let mut settings = settings::of(scenario);
     settings.push(format!("telemetry={TELEMETRY}"));
+    settings.extend(more.iter().map(|&setting| setting.to_owned()));
     let image = board_image(machine.board(), "bench");
     let finished = run(&image, machine, &settings, folder.path(), TIME_OUT)
         .unwrap_or_else(|error| panic!("{error}"));

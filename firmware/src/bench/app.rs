@@ -4,13 +4,13 @@ use super::command_line::{self, Command};
 use super::exit::ExitCode;
 use super::host_file::HostFileError;
 use super::interrupts::{self, ControlInterrupt, PwmInterrupt};
-use super::link::{Link, Pace};
+use super::link::Link;
+use super::pace::{self, Pace};
 use super::recorder::{self, Recorder};
 use super::refusal::{refuse_command, refuse_scenario, refuse_timer_clock};
 use super::{counters, drill, in_loop, open_loop, run_state};
 use crate::board::{Board, Current};
 use crate::{stack, steering};
-use cortex_m::peripheral::SCB;
 use shared_model::Scenario;
 use shared_model::ecu::Ecu;
 use shared_model::open_loop::OpenLoop;
@@ -29,14 +29,14 @@ pub fn run() -> ExitCode {
     }
     match run.link {
         Some(link) => steer(&run.scenario, link),
-        None => simulate(&run.scenario, run.telemetry),
+        None => simulate(&run.scenario, run.telemetry, run.pace),
     }
 }
 
 /// The vehicle model runs on the ECU.
 // Out of line, as is the other: the stack need not hold what only one of them needs.
 #[inline(never)]
-fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>) -> ExitCode {
+fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>, pace: Pace) -> ExitCode {
     let ecu = match OpenLoop::new(scenario) {
         Ok(ecu) => ecu,
         Err(error) => return refuse_scenario(&error),
@@ -47,7 +47,7 @@ fn simulate(scenario: &Scenario<f32>, telemetry: Option<&str>) -> ExitCode {
         scenario.run.wheel_speed_rpm,
         scenario.model_rate_hz()
     );
-    match run_open_loop(scenario, ecu, telemetry) {
+    match run_open_loop(scenario, ecu, telemetry, pace) {
         Ok(code) => code,
         Err(HostFileError) => {
             defmt::error!("cannot write the telemetry file");
@@ -79,6 +79,7 @@ fn run_open_loop(
     scenario: &Scenario<f32>,
     ecu: OpenLoop<f32>,
     telemetry: Option<&str>,
+    pace: Pace,
 ) -> Result<ExitCode, HostFileError> {
     let neutral = ecu.pwm.neutral();
     let header = Header {
@@ -96,7 +97,10 @@ fn run_open_loop(
     };
     let period = neutral.period();
     let (task, control) = (ecu.pwm, ecu.control);
-    interrupts::start(period, scenario, scenario.step_s(), |(pwm, _)| {
+    if pace == Pace::Host {
+        counters::leave_pwm_unmeasured();
+    }
+    interrupts::start(period, scenario, scenario.step_s(), pace, |(pwm, _)| {
         let pwm = cortex_m::singleton!(: open_loop::PwmInterrupt = open_loop::PwmInterrupt {
             task,
             pwm,
@@ -115,10 +119,14 @@ fn run_open_loop(
     });
 
     while !run_state::is_finished() {
-        if recorder.take_one()? {
+        let is_taken = recorder.take_one()?;
+        if is_taken {
             Current::feed_watchdog();
-        } else {
-            Current::idle();
+        }
+        match pace {
+            Pace::Host => pace::begin_period(),
+            Pace::Timer if is_taken => {}
+            Pace::Timer => Current::idle(),
         }
     }
     while recorder.take_one()? {}
@@ -132,7 +140,7 @@ fn run_in_loop(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode 
     let period = ecu.pwm.neutral().period();
     let tick_s = 1.0 / scenario.run.control_rate_hz;
     let pace = link.pace;
-    interrupts::start(period, scenario, tick_s, |(pin, bridge)| {
+    interrupts::start(period, scenario, tick_s, pace, |(pin, bridge)| {
         let pwm = in_loop::place_pwm(in_loop::PwmInterrupt {
             steering: steering::Pwm {
                 task: ecu.pwm,
@@ -149,9 +157,6 @@ fn run_in_loop(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode 
         })?;
         Some((PwmInterrupt::InLoop(pwm), ControlInterrupt::InLoop(control)))
     });
-    if pace == Pace::Host {
-        Current::stop_pwm_interrupt();
-    }
     let mut ticks_seen = 0;
     while !run_state::is_finished() {
         let ticks = steering::control_ticks();
@@ -160,7 +165,7 @@ fn run_in_loop(scenario: &Scenario<f32>, ecu: Ecu<f32>, link: Link) -> ExitCode 
             Current::feed_watchdog();
         }
         match pace {
-            Pace::Host => SCB::set_pendst(),
+            Pace::Host => pace::begin_period(),
             Pace::Timer => Current::idle(),
         }
     }

@@ -1,5 +1,6 @@
 //! The scenario from the command line that the emulator was started with.
 
+use super::pace::Pace;
 use crate::board::{Board, Current};
 use cortex_m_semihosting::syscall1;
 use shared_model::Scenario;
@@ -13,6 +14,8 @@ const MAX_BYTES: usize = 4096;
 const TELEMETRY: &str = "telemetry=";
 /// Key of the link's name.
 const LINK: &str = "link=";
+/// Key of the pace of a run without a link.
+const PACE: &str = "pace=";
 /// Key of a preset, which replaces the whole scenario.
 const PRESET: &str = "preset=";
 
@@ -35,6 +38,8 @@ pub struct Run {
     pub telemetry: Option<&'static str>,
     /// Name of the link to a vehicle, if the ECU is to steer one.
     pub link: Option<&'static str>,
+    /// The pace of a run without a link; a link has its own.
+    pub pace: Pace,
 }
 
 /// Reason why the command line was refused.
@@ -74,6 +79,7 @@ fn parse(text: &'static str) -> Result<Command, CommandError> {
         scenario: Scenario::reconstruction(),
         telemetry: None,
         link: None,
+        pace: Pace::Timer,
     };
     let timer_clock_hz = Current::TIMER_CLOCK_HZ as f32;
     run.scenario.servo.timer_clock_hz = timer_clock_hz;
@@ -82,6 +88,9 @@ fn parse(text: &'static str) -> Result<Command, CommandError> {
             run.telemetry = Some(path);
         } else if let Some(name) = word.strip_prefix(LINK) {
             run.link = Some(name);
+        } else if let Some(name) = word.strip_prefix(PACE) {
+            let error = CommandError::Setting(word, SettingError::UnknownChoice);
+            run.pace = Pace::of(name).ok_or(error)?;
         } else {
             let applied = run.scenario.apply(word);
             applied.map_err(|error| CommandError::Setting(word, error))?;

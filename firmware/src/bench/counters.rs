@@ -1,13 +1,27 @@
 //! Counters of a run: overruns, and the cost of the PWM interrupt.
 
 use crate::board::{Board, Current};
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
+/// Whether the PWM interrupt is measured.
+static MEASURES_PWM: AtomicBool = AtomicBool::new(true);
 static OVERRUNS: AtomicU32 = AtomicU32::new(0);
 /// Most counts that the PWM interrupt took since the last control task.
 static PWM_COST: AtomicU32 = AtomicU32::new(0);
 /// Counts that the PWM interrupt spent outside its task.
 static FOREIGN_COST: AtomicU32 = AtomicU32::new(0);
+
+/// Leaves the PWM interrupt unmeasured: its cost is then 0. A read of the emulator's timer takes about as
+/// long as the interrupt's task. For use before the interrupt is enabled.
+pub fn leave_pwm_unmeasured() {
+    MEASURES_PWM.store(false, Ordering::Relaxed);
+}
+
+/// The counter's value at the start of a PWM interrupt; `None` if it is unmeasured.
+pub fn pwm_start() -> Option<u32> {
+    let measures = MEASURES_PWM.load(Ordering::Relaxed);
+    measures.then(Current::cost_counter)
+}
 
 /// Counts a record or duty code that was lost, or a task that was late. Any of them fails the run.
 pub fn count_overrun() {
@@ -33,7 +47,9 @@ pub fn take_pwm_cost() -> u16 {
 
 /// Leaves the counts that `f` takes out of the PWM interrupt's cost.
 pub fn uncounted<O>(f: impl FnOnce() -> O) -> O {
-    let start = Current::cost_counter();
+    let Some(start) = pwm_start() else {
+        return f();
+    };
     let output = f();
     let cost = Current::cost_counter().wrapping_sub(start);
     FOREIGN_COST.fetch_add(cost, Ordering::Relaxed);

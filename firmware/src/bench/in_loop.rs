@@ -2,7 +2,8 @@
 //! it, and the host moves the vehicle in between.
 
 use super::exit::{self, ExitCode};
-use super::link::{Link, Pace};
+use super::link::Link;
+use super::pace::{self, Pace};
 use super::{counters, run_state};
 use crate::board::{Board, Current};
 use crate::steering;
@@ -49,7 +50,8 @@ impl PwmInterrupt {
             },
             control_cost: CONTROL_COST.load(Ordering::Relaxed),
         };
-        let Ok(received) = counters::uncounted(|| self.link.exchange(&sent)) else {
+        let due = begun.control_due;
+        let Ok(received) = counters::uncounted(|| self.link.exchange(&sent, due)) else {
             exit::end_safely(ExitCode::LinkLost);
         };
         if received.stop {
@@ -61,15 +63,17 @@ impl PwmInterrupt {
         if begun.control_due {
             self.call_control();
         }
+        pace::end_period(begun.control_due);
     }
 
     fn call_control(&mut self) {
-        let now = Current::cost_counter();
         let elapsed_counts = match self.link.pace {
             Pace::Host => self.nominal_counts,
-            Pace::Timer => now.wrapping_sub(self.last_tick_counts),
+            Pace::Timer => {
+                let now = Current::cost_counter();
+                now.wrapping_sub(core::mem::replace(&mut self.last_tick_counts, now))
+            }
         };
-        self.last_tick_counts = now;
         self.steering
             .call_control(self.frame.take(), elapsed_counts);
     }

@@ -1,6 +1,7 @@
 //! The two tasks as interrupts, whichever program runs in them. Nothing here can panic: the binary
 //! `panic-free` proves it at link time.
 
+use super::pace::Pace;
 use super::{counters, in_loop, jitter, open_loop};
 use crate::board::{Board, Current};
 use crate::{clock, tasks};
@@ -37,11 +38,12 @@ pub enum ControlInterrupt {
 type Servo = (<Current as Board>::Pwm, <Current as Board>::Bridge);
 
 /// Starts PWM, interrupts and watchdog; `tasks` makes the tasks of the two interrupts. The control
-/// task runs every `tick_s`.
+/// task runs every `tick_s`. At the host's pace the timer never calls the PWM interrupt.
 pub fn start(
     period: u16,
     scenario: &Scenario<f32>,
     tick_s: f32,
+    pace: Pace,
     tasks: impl FnOnce(Servo) -> Option<(PwmInterrupt, ControlInterrupt)>,
 ) {
     let timeout_ms = (WATCHDOG_PERIODS * 1000.0 * tick_s) as u32;
@@ -52,6 +54,7 @@ pub fn start(
         if let Some((pwm, control)) = pwm.and_then(tasks) {
             hand_over(pwm, control, samples_per_ms);
         }
+        pace.set();
         tasks::set_priorities();
         Current::start_watchdog(timeout_ms.max(WATCHDOG_LEAST_MS));
     });
@@ -69,17 +72,22 @@ pub fn hand_over(pwm: PwmInterrupt, control: ControlInterrupt, samples_per_ms: u
 /// The PWM interrupt; `interrupt` is its own.
 #[inline]
 pub fn pwm(interrupt: &mut Option<PwmInterrupt>) {
-    let start = Current::cost_counter();
+    let start = counters::pwm_start();
     if interrupt.is_none() {
         *interrupt = critical_section::with(|cs| PWM_START.borrow(cs).take());
     }
-    jitter::record(clock::count_sample(), start);
+    let index = clock::count_sample();
+    if let Some(start) = start {
+        jitter::record(index, start);
+    }
     match interrupt {
         Some(PwmInterrupt::OpenLoop(interrupt)) => interrupt.run(),
         Some(PwmInterrupt::InLoop(interrupt)) => interrupt.run(),
         None => {}
     }
-    counters::record_pwm_cost(start);
+    if let Some(start) = start {
+        counters::record_pwm_cost(start);
+    }
 }
 
 /// The control interrupt; `interrupt` is its own.

@@ -6,6 +6,7 @@
 //! | start, end and interrupts of a run | [`app`], [`interrupts`] |
 //! | the tasks without and with a vehicle | [`open_loop`], [`in_loop`] |
 //! | telemetry | [`recorder`] |
+//! | pace of the PWM periods, measurements | [`pace`], [`counters`], [`jitter`] |
 //! | faults on purpose | [`drill`] |
 
 pub mod app;
@@ -19,6 +20,7 @@ pub mod interrupts;
 pub mod jitter;
 pub mod link;
 pub mod open_loop;
+pub mod pace;
 pub mod recorder;
 pub mod refusal;
 pub mod run_state;

@@ -3,7 +3,7 @@
 
 use super::counters::{self, count_overrun};
 use super::recorder::{DutyRecording, RecordProducer};
-use super::run_state;
+use super::{pace, run_state};
 use crate::board::{Board, Current};
 use crate::tasks;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -50,6 +50,7 @@ impl PwmInterrupt {
         if sample.control_due && !tasks::call_control() {
             count_overrun();
         }
+        pace::end_period(sample.control_due);
     }
 }
 

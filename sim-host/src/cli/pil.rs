@@ -26,8 +26,9 @@ use std::path::{Path, PathBuf};
 /// Run manoeuvres with the ECU in the loop as a model (MIL), as software on this host (SIL) and as
 /// firmware in QEMU (PIL), and compare the three in each PWM period.
 ///
-/// The vehicle is simulated on the host in f64. Once per PWM period the ECU sends its duty and the
-/// vehicle answers. Repeated runs are byte-identical.
+/// The vehicle is simulated on the host in f64. In each PWM period it responds to the ECU's duty.
+/// Firmware and vehicle exchange their data once per control tick or, with `--link files`, once per
+/// PWM period, with the same commands. Repeated runs are byte-identical.
 #[derive(clap::Args)]
 #[command(
     mut_arg("out", |arg| arg.help("Write the vehicle's trajectory as CSV, one row per control tick")),
@@ -57,7 +58,7 @@ pub struct Arguments {
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     time: Option<f64>,
     /// Link to the firmware
-    #[arg(long, value_parser = link_kinds(), default_value = "files")]
+    #[arg(long, value_parser = link_kinds(), default_value = "ticks")]
     link: LinkKind,
     /// Machine to emulate
     #[arg(long, value_parser = machines(), default_value = "mps2-an386")]
@@ -128,7 +129,7 @@ impl Arguments {
     fn firmware(&self) -> PathBuf {
         let name = match self.link {
             LinkKind::Uart => "ecu",
-            LinkKind::Files | LinkKind::Timed => "bench",
+            _ => "bench",
         };
         let usual = Path::new("target/thumbv7em-none-eabihf/firmware").join(name);
         self.firmware.clone().unwrap_or(usual)
@@ -302,8 +303,10 @@ fn show(summaries: &[Summary], link: LinkKind) {
     say!(
         "PIL: {}",
         match link {
+            LinkKind::Ticks | LinkKind::MeasuredTicks =>
+                "over pipes, one exchange per control tick; the host is the clock, and each control tick takes its nominal time",
             LinkKind::Files =>
-                "over pipes; the host is the clock, and each control tick takes its nominal time",
+                "over pipes, one exchange per PWM period; the host is the clock, and each control tick takes its nominal time",
             LinkKind::Timed => "over pipes; the board's timers are the clock",
             LinkKind::Uart =>
                 "the image `ecu` over its UART; the board's timers are the clock, the debugger stops them while the vehicle answers",

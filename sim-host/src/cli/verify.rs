@@ -22,7 +22,8 @@ use std::time::{Duration, Instant};
 ///
 /// The runs are: 1750 rpm without dither, with a square wave of 0.1 V and with a sine wave of 1.0
 /// V; 1600, 1845 and 1880 rpm without dither; both dithers as true signals; and one run on a second
-/// core. The outputs are index.html, verdict.json, junit.xml and figures.
+/// core. They are as fast as the emulator executes them; a short run of each at the pace of the
+/// board's timer measures timing. The outputs are index.html, verdict.json, junit.xml and figures.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host verify           # the paper's vehicle; report in target/report

@@ -16,7 +16,7 @@ use shared_model::dither::{Application, Waveform};
 use shared_model::servo::Pwm;
 use shared_model::telemetry::record_len;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
@@ -33,6 +33,8 @@ const LONG_RUN_S: f64 = 600.0;
 /// Greatest length of runs that are not compared on all levels, s.
 const SIGNAL_RUN_S: f64 = 40.0;
 const SECOND_CORE_RUN_S: f64 = 10.0;
+/// Length of the runs that measure timing, after the start of the dither, s.
+const TIMING_RUN_S: f64 = 2.0;
 const TELEMETRY: &str = "telemetry.bin";
 /// How often the progress of a run is looked at.
 const PROGRESS_POLL: Duration = Duration::from_millis(200);
@@ -79,6 +81,12 @@ pub(super) struct Outcome {
     pub(super) case: Case,
     pub(super) recording: Recording,
     pub(super) log: Vec<String>,
+    /// A short run at the pace of the board's timer, which measures timing; the main run is at the
+    /// host's pace.
+    pub(super) timing: Recording,
+    pub(super) timing_log: Vec<String>,
+    /// Words of the timing run that differ from the main run, and words that are compared.
+    pub(super) pace: Bits,
     pub(super) firmware: Trace,
     /// Index of the first state after the transient of the dither.
     pub(super) settled: usize,
@@ -200,9 +208,18 @@ pub(super) fn run(
         let title = case.title;
         return Err(VerifyError::EndsEarly { title, end });
     }
-    let (recording, log) = run_firmware(&case, &rounded, options, on_progress)?;
+    let at_host_pace = [String::from("pace=host")];
+    let (recording, log) = run_firmware(&case, &rounded, &at_host_pace, options, on_progress)?;
+    let mut short = rounded;
+    let timing_s = short.dither.start_time_s + TIMING_RUN_S as f32;
+    short.run.duration_s = short.run.duration_s.min(timing_s);
+    let (timing, timing_log) = run_firmware(&case, &short, &[], options, &|_| {})?;
 
     let firmware = trace_of(&recording);
+    let pace = equivalence::bits(
+        &trace_of(&timing),
+        &beginning(&firmware, short.steps() as usize),
+    );
     let settled = match case.scenario.dither.waveform {
         Waveform::None => 0,
         _ => firmware.index_after(case.scenario.dither.start_time_s + DITHER_TRANSIENT_S),
@@ -224,6 +241,9 @@ pub(super) fn run(
         firmware,
         recording,
         log,
+        timing,
+        timing_log,
+        pace,
         case,
     })
 }
@@ -245,6 +265,7 @@ fn analyse(scenario: &Scenario<f64>, firmware: &Trace) -> Result<Analysis, Verif
 fn run_firmware(
     case: &Case,
     scenario: &Scenario<f32>,
+    more: &[String],
     options: &Options,
     on_progress: &(impl Fn(Progress) + Sync),
 ) -> Result<(Recording, Vec<String>), VerifyError> {
@@ -252,9 +273,11 @@ fn run_firmware(
     let telemetry = folder.path().join(TELEMETRY);
     let mut settings = settings::of(scenario);
     settings.push(format!("telemetry={TELEMETRY}"));
-    let finished = AtomicBool::new(false);
+    settings.extend_from_slice(more);
+    let (finish, finished) = mpsc::channel::<()>();
     let run = thread::scope(|scope| {
-        scope.spawn(|| report_progress(&telemetry, scenario, &finished, on_progress));
+        let telemetry = &telemetry;
+        scope.spawn(move || report_progress(telemetry, scenario, &finished, on_progress));
         let run = qemu::run(
             &options.image,
             case.machine,
@@ -263,7 +286,7 @@ fn run_firmware(
             options.time_out,
             |_| {},
         );
-        finished.store(true, Ordering::Relaxed);
+        drop(finish);
         run
     });
     let title = || case.title.clone();
@@ -294,14 +317,15 @@ fn run_firmware(
 fn report_progress(
     telemetry: &Path,
     scenario: &Scenario<f32>,
-    finished: &AtomicBool,
+    finished: &mpsc::Receiver<()>,
     on_progress: &(impl Fn(Progress) + Sync),
 ) {
     let a_second =
         f64::from(scenario.model_rate_hz()) * record_len(scenario.samples_per_step() as u16) as f64;
     let mut told = 0.0;
     loop {
-        let done = finished.load(Ordering::Relaxed);
+        let waited = finished.recv_timeout(PROGRESS_POLL);
+        let done = waited == Err(mpsc::RecvTimeoutError::Disconnected);
         let length = std::fs::metadata(telemetry).map_or(0, |file| file.len());
         let simulated = length as f64 / a_second;
         on_progress(Progress::Simulated(simulated - told));
@@ -309,11 +333,35 @@ fn report_progress(
         if done {
             return;
         }
-        thread::sleep(PROGRESS_POLL);
+    }
+}
+
+/// The first `steps` model steps of a run.
+fn beginning(trace: &Trace, steps: usize) -> Trace {
+    let states = steps.min(trace.states.len());
+    let duties = (steps * trace.samples_per_step).min(trace.duties.len());
+    Trace {
+        states: trace.states[..states].to_vec(),
+        duties: trace.duties[..duties].to_vec(),
+        ..*trace
     }
 }
 
 impl Outcome {
+    /// Instructions of both tasks: of the timing run, and of the control task also in the main run.
+    pub(super) fn instructions(&self) -> Instructions {
+        Instructions::of(&self.timing).with_control_of(&Instructions::of(&self.recording))
+    }
+
+    /// The deepest stack of both runs, bytes.
+    pub(super) fn stack_bytes(&self) -> u32 {
+        let runs = [&self.recording, &self.timing];
+        runs.map(|run| run.trailer.stack_bytes)
+            .into_iter()
+            .max()
+            .unwrap_or(u32::MAX)
+    }
+
     /// The case and its motion in one line.
     pub(super) fn summary(&self) -> String {
         format!("{}: {}", self.case.title, self.period)
@@ -358,7 +406,7 @@ impl Outcome {
                 NEVER_PART
             },
             horizon_s,
-            instructions: Instructions::of(&self.recording),
+            instructions: self.instructions(),
         }
     }
 }

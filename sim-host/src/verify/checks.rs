@@ -17,7 +17,7 @@ const JITTER_LIMIT_PERCENT: f64 = 1.0;
 
 /// The checks of one case.
 pub(super) fn of(outcome: &Outcome) -> Vec<Check> {
-    let mut checks = vec![bits(outcome), overruns(outcome)];
+    let mut checks = vec![bits(outcome), pace(outcome), overruns(outcome)];
     if let Some(analysis) = &outcome.analysis {
         checks.push(one_step(outcome, analysis));
         checks.push(horizon(outcome, analysis));
@@ -48,15 +48,33 @@ fn bits(outcome: &Outcome) -> Check {
     ))
 }
 
+fn pace(outcome: &Outcome) -> Check {
+    let pace = &outcome.pace;
+    let title = "Bits: words that differ, firmware at the timer's and at the host's pace";
+    let first = pace
+        .first
+        .as_ref()
+        .map_or(String::new(), |first| format!("; first: {first}"));
+    Check::equals(id("pace", outcome), title, pace.differing as f64, 0.0).detail(format!(
+        "{} state words, friction modes and duty codes of the run that measures timing{first}",
+        pace.compared
+    ))
+}
+
 fn overruns(outcome: &Outcome) -> Check {
-    let overruns = f64::from(outcome.recording.trailer.overruns);
+    let runs = [&outcome.recording, &outcome.timing];
+    let overruns: f64 = runs.map(|run| f64::from(run.trailer.overruns)).iter().sum();
     Check::equals(
         id("overruns", outcome),
         "Records lost, tasks late",
         overruns,
         0.0,
     )
-    .detail(outcome.log.last().cloned().unwrap_or_default())
+    .detail(format!(
+        "at the timer's pace: {}; at the host's pace: {}",
+        outcome.timing_log.last().map_or("", String::as_str),
+        outcome.log.last().map_or("", String::as_str)
+    ))
 }
 
 fn one_step(outcome: &Outcome, analysis: &Analysis) -> Check {
@@ -181,16 +199,10 @@ pub(super) fn chaotic(outcome: &Outcome) -> Check {
 
 /// What the firmware needs of the machine.
 pub(super) fn resources(image: &Image, outcomes: &[Outcome]) -> Vec<Check> {
-    let stack = outcomes
-        .iter()
-        .map(|outcome| outcome.recording.trailer.stack_bytes)
-        .max();
+    let stack = outcomes.iter().map(Outcome::stack_bytes).max();
     let mut checks: Vec<Check> = Vec::new();
     for outcome in outcomes {
-        checks.push(load(
-            id("load", outcome),
-            &Instructions::of(&outcome.recording),
-        ));
+        checks.push(load(id("load", outcome), &outcome.instructions()));
         checks.push(jitter(outcome));
     }
     checks.push(
@@ -244,7 +256,7 @@ pub(super) fn load(id: String, instructions: &Instructions) -> Check {
 
 /// How far the spacing of PWM interrupts strays, by a timer that is not their clock.
 fn jitter(outcome: &Outcome) -> Check {
-    let (header, trailer) = (&outcome.recording.header, &outcome.recording.trailer);
+    let (header, trailer) = (&outcome.timing.header, &outcome.timing.trailer);
     let (least, most) = (trailer.min_interval, trailer.max_interval);
     let spread = f64::from(most) - f64::from(least);
     let period = f64::from(header.cost_clock_hz)
@@ -260,7 +272,7 @@ fn jitter(outcome: &Outcome) -> Check {
         "{least} to {most} counts of an independent timer of {} MHz between {} interrupts, nominally {period}; in the emulator's \
          time, which is counted in instructions",
         f64::from(header.cost_clock_hz) / 1e6,
-        outcome.recording.duties.len()
+        outcome.timing.duties.len()
     ))
 }
 
@@ -270,14 +282,15 @@ pub(super) fn notes(image: &Image, outcomes: &[Outcome]) -> Vec<(String, String)
         .iter()
         .map(|outcome| outcome.firmware.states.len() as f64 * outcome.firmware.step_s)
         .sum();
-    let stack = outcomes
+    let timed: f64 = outcomes
         .iter()
-        .map(|outcome| outcome.recording.trailer.stack_bytes)
-        .max();
+        .map(|outcome| outcome.timing.records.len() as f64 * outcome.firmware.step_s)
+        .sum();
+    let stack = outcomes.iter().map(Outcome::stack_bytes).max();
     vec![
         (
             "Simulated on the target".into(),
-            format!("{simulated} s in {} runs", outcomes.len()),
+            format!("{simulated} s in {} runs, and {timed} s in as many runs that measure timing", outcomes.len()),
         ),
         (
             "Firmware image".into(),

@@ -49,7 +49,7 @@ fn one(
     let target = Target {
         image: options.image.clone(),
         machine: Machine::Mps2An386,
-        link: LinkKind::Files,
+        link: LinkKind::MeasuredTicks,
         time_out: options.time_out,
     };
     let levels = run_all(&scenario, &manoeuvre, &target, || {}).map_err(|source| {

@@ -42,24 +42,29 @@ pub fn verify(
     for case in &cases {
         on_progress(Progress::Planned(case.scenario.run.duration_s));
     }
-    let outcomes: Vec<Outcome> = cases
-        .into_par_iter()
-        // One at a time from the list's start, so that the long runs do not end up behind each
-        // other.
-        .with_max_len(1)
-        .map(|case| {
-            let outcome = case::run(case, options, &on_progress)?;
-            on_progress(Progress::Done(outcome.summary()));
-            Ok(outcome)
-        })
-        .collect::<Result<_, VerifyError>>()?;
+    let in_open_loop = || {
+        cases
+            .into_par_iter()
+            // One at a time from the list's start, so that the long runs do not end up behind each
+            // other.
+            .with_max_len(1)
+            .map(|case| {
+                let outcome = case::run(case, options, &on_progress)?;
+                on_progress(Progress::Done(outcome.summary()));
+                Ok(outcome)
+            })
+            .collect::<Result<Vec<Outcome>, VerifyError>>()
+    };
+    // At the same time, so that no thread is idle while the last run of one part ends.
+    let (outcomes, in_loop) = rayon::join(in_open_loop, || in_loop::run(options, &on_progress));
+    let outcomes = outcomes?;
 
     let mut checks: Vec<Check> = Vec::new();
     for outcome in &outcomes {
         checks.extend(checks::of(outcome));
     }
     checks.extend(suppression::checks(&outcomes));
-    let (in_loop, drives) = in_loop::run(options, &on_progress)?;
+    let (in_loop, drives) = in_loop?;
     checks.extend(in_loop);
     checks.extend(checks::resources(&options.image, &outcomes));
     checks.extend(proofs::stack(options, &outcomes));

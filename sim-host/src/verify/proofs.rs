@@ -48,10 +48,7 @@ pub(super) fn stack(options: &Options, outcomes: &[Outcome]) -> Vec<Check> {
     } else {
         stack.problems.join("; ")
     });
-    let measured = outcomes
-        .iter()
-        .map(|outcome| outcome.recording.trailer.stack_bytes)
-        .max();
+    let measured = outcomes.iter().map(Outcome::stack_bytes).max();
     let measured = Check::at_most(
         "stack-measured/ecu",
         "Deepest stack of all runs, against the bound",

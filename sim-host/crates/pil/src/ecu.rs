@@ -1,6 +1,7 @@
 //! The ECU in the loop: model (MIL), software (SIL) or processor (PIL).
 
 use qemu::bus_session::{BusSession, Period};
+use qemu::periods::Periods;
 use qemu::session::Session;
 use qemu::{Finished, RunError};
 use shared_model::bus::Message;
@@ -262,14 +263,12 @@ impl Ecu for Processor {
 /// the bus once per control tick. The duty codes are read from the emulated PWM.
 pub struct OnBus {
     session: BusSession,
-    /// PWM periods that are not yet passed on: those of the tick, and perhaps of the next, because
-    /// the PWM interrupt preempts the control task.
+    /// PWM periods that are not yet in a packet: those of the next tick, because the PWM interrupt
+    /// preempts the control task.
     periods: VecDeque<Period>,
     periods_per_tick: u32,
-    /// PWM periods of the tick that are not yet passed on.
-    periods_left: u32,
-    /// The frame of the tick, due with its last duty.
-    frame: Option<FrameBytes>,
+    /// Packets of the tick, not yet passed on.
+    packets: Periods<Packet>,
 }
 
 impl OnBus {
@@ -279,8 +278,7 @@ impl OnBus {
             session,
             periods: VecDeque::new(),
             periods_per_tick,
-            periods_left: 0,
-            frame: None,
+            packets: Periods::default(),
         }
     }
 
@@ -300,24 +298,43 @@ impl OnBus {
 
 impl Ecu for OnBus {
     fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError> {
-        if self.periods_left == 0 {
-            let tick = self.session.tick()?;
-            self.periods.extend(tick.periods);
-            self.frame = tick.frames.last().copied();
-            self.periods_left = self.periods_per_tick;
-        }
-        // A tick has all its periods; after a reset the first has fewer.
-        let period = self.periods.pop_front().unwrap_or_default();
-        self.periods_left -= 1;
-        let is_last = self.periods_left == 0;
-        let reply = answer(&Packet {
-            duty_code: period.duty_code,
-            bridge_on: period.bridge_on,
-            frame: self.frame.take_if(|_| is_last),
-        });
+        let next = self
+            .packets
+            .next_or(|| tick(&mut self.session, &mut self.periods, self.periods_per_tick))?;
+        // A tick has at least one period.
+        let reply = answer(&next.unwrap_or(Packet {
+            duty_code: 0,
+            bridge_on: false,
+            frame: None,
+        }));
         match reply.frame {
             Some(frame) => self.session.send(Message::Sensor, &frame),
             None => Ok(()),
         }
     }
+}
+
+/// Runs the ECU to the end of a tick and returns its packets. The frame is due with the last.
+fn tick(
+    session: &mut BusSession,
+    periods: &mut VecDeque<Period>,
+    periods_per_tick: u32,
+) -> Result<Vec<Packet>, RunError> {
+    let tick = session.tick()?;
+    periods.extend(tick.periods);
+    let mut packets: Vec<Packet> = (0..periods_per_tick)
+        .map(|_| {
+            // A tick has all its periods; after a reset the first has fewer.
+            let period = periods.pop_front().unwrap_or_default();
+            Packet {
+                duty_code: period.duty_code,
+                bridge_on: period.bridge_on,
+                frame: None,
+            }
+        })
+        .collect();
+    if let Some(last) = packets.last_mut() {
+        last.frame = tick.frames.last().copied();
+    }
+    Ok(packets)
 }

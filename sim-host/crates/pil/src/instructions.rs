@@ -55,6 +55,17 @@ impl Instructions {
         }
     }
 
+    /// With the control tasks of another run in addition.
+    pub fn with_control_of(mut self, other: &Self) -> Self {
+        let all = self.control.iter().chain(&other.control);
+        let mut control = BTreeMap::new();
+        for &(count, times) in all {
+            *control.entry(count).or_insert(0) += times;
+        }
+        self.control = control.into_iter().collect();
+        self
+    }
+
     /// Worst-case load of the core by both tasks; above 1 the core is overloaded.
     pub fn worst_share(&self) -> f64 {
         let pwm = f64::from(self.periods_a_tick) * f64::from(most(&self.pwm));

@@ -12,6 +12,7 @@ mod emulator;
 pub mod gdb;
 pub mod log;
 mod machine;
+pub mod periods;
 mod pipes;
 pub mod qmp;
 mod rtt;

@@ -42,7 +42,12 @@ pub(crate) fn read_exact(
     Ok(())
 }
 
-fn read_some(file: &mut File, limit: Duration, bytes: &mut [u8]) -> std::io::Result<usize> {
+/// Reads at least one byte into `bytes`, waiting at most `limit`.
+pub(crate) fn read_some(
+    file: &mut File,
+    limit: Duration,
+    bytes: &mut [u8],
+) -> std::io::Result<usize> {
     wait_until_ready(file, PollFlags::IN, limit)?;
     match file.read(bytes)? {
         0 => Err(ErrorKind::UnexpectedEof.into()),
@@ -90,6 +95,7 @@ fn wait_until_ready(file: &File, flags: PollFlags, limit: Duration) -> std::io::
 #[cfg(test)]
 mod tests {
     use super::*;
+    use shared_model::exchange::TO_HOST_LEN;
     use std::os::fd::OwnedFd;
 
     #[test]

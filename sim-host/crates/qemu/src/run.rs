@@ -78,6 +78,16 @@ pub enum RunError {
         /// The last log line.
         last_line: String,
     },
+    /// A fault behind the servo's pin, over a link that has none.
+    #[error(
+        "the duty captured on the servo's pin is not the one that the firmware put out ({sent} counts), but {captured} counts: the link `ticks` cannot carry it; use `files` or `timed`"
+    )]
+    CapturedDuty {
+        /// The firmware's duty code.
+        sent: u16,
+        /// The captured one.
+        captured: u16,
+    },
     /// The image lacks a symbol of this firmware.
     #[error(
         "the image has no {name}: it must be this project's image `ecu`; build it with `cargo xtask firmware`"

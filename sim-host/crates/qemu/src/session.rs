@@ -1,13 +1,15 @@
-//! The ECU in the emulator with one exchange per PWM period: the host replaces its servo and
-//! sensors.
+//! The ECU in the emulator with one exchange per PWM period or per control tick: the host replaces
+//! its servo and sensors.
 
 use crate::emulator::{Emulator, first_words};
 use crate::log::{Lines, LogDecoder};
 use crate::machine::Machine;
-use crate::pipes::{make_pipe, open_without_waiting, read_exact, write_all};
+use crate::periods::Periods;
+use crate::pipes::{make_pipe, open_without_waiting, read_exact, read_some, write_all};
 use crate::run::{self, Finished, RunError};
 use image::Image;
 use shared_model::exchange::{TO_HOST_LEN, ToEcu, ToHost};
+use shared_model::tick_exchange::{MAX_TICK_TO_HOST_LEN, TickToEcu, TickToHost};
 use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -27,9 +29,14 @@ const LOCKUP: &str = "Lockup";
 /// Link for the exchange.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum LinkKind {
-    /// Pipes, read and written by the emulator. The host starts each PWM period: fast.
+    /// Pipes, read and written by the emulator once per control tick. The host starts each PWM
+    /// period. The duty captured on the pin is the ECU's own.
+    Ticks,
+    /// The same with the cost of the PWM interrupt, whose measurement takes a quarter of the time.
+    MeasuredTicks,
+    /// As `Ticks` with one exchange per PWM period, in which the captured duty can be another.
     Files,
-    /// The same, but the board's timer starts each PWM period, and the gate measures the time
+    /// As `Files`, but the board's timer starts each PWM period, and the gate measures the time
     /// between control ticks.
     Timed,
     /// The product's image, over its UART; see [`crate::bus_session`].
@@ -38,11 +45,19 @@ pub enum LinkKind {
 
 impl LinkKind {
     /// All kinds.
-    pub const ALL: [Self; 3] = [Self::Files, Self::Timed, Self::Uart];
+    pub const ALL: [Self; 5] = [
+        Self::Ticks,
+        Self::MeasuredTicks,
+        Self::Files,
+        Self::Timed,
+        Self::Uart,
+    ];
 
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {
+            Self::Ticks => "ticks",
+            Self::MeasuredTicks => "ticks-measured",
             Self::Files => "files",
             Self::Timed => "timed",
             Self::Uart => "uart",
@@ -52,8 +67,12 @@ impl LinkKind {
     /// Its description in the help.
     pub fn description(self) -> &'static str {
         match self {
-            Self::Files => "pipes at the host's pace: fast",
-            Self::Timed => "pipes at the pace of the board's timer, whose ticks the gate measures",
+            Self::Ticks => "pipes at the host's pace, one exchange per control tick: the fastest",
+            Self::MeasuredTicks => "as `ticks`, with the cost of the PWM interrupt",
+            Self::Files => "pipes at the host's pace, one exchange per PWM period",
+            Self::Timed => {
+                "pipes at the pace of the board's timer, whose ticks the gate measures, one exchange per PWM period"
+            }
             Self::Uart => "the image `ecu`, over its UART at the pace of its timer",
         }
     }
@@ -67,6 +86,10 @@ impl LinkKind {
 struct Transport {
     from_ecu: File,
     to_ecu: File,
+    /// With an exchange per control tick: the periods of the tick. `None` with one per PWM period.
+    tick: Option<Periods<ToHost>>,
+    /// The ECU's last duty code.
+    duty_code: u16,
 }
 
 /// An ECU in the emulator that waits for the vehicle's answer. Dropping it ends the emulator.
@@ -178,7 +201,7 @@ impl Session {
         let emulator = run::start(image, machine, &settings, directory.path(), &options)?;
         let mut attended = Attended::new(emulator, decoder);
         Ok(Self {
-            transport: pipes.open(&mut attended, limit)?,
+            transport: pipes.open(&mut attended, link, limit)?,
             attended,
             limit,
             _directory: directory,
@@ -192,14 +215,26 @@ impl Session {
     /// If the emulator has ended, or sends nothing within the limit.
     pub fn receive(&mut self) -> Result<ToHost, RunError> {
         let received = self.transport.receive(self.limit);
-        received.map_err(|error| self.lost(&error))
+        let received = received.map_err(|error| self.lost(&error))?;
+        self.transport.duty_code = received.packet.duty_code;
+        Ok(received)
     }
 
     /// Sends the answer.
     ///
     /// # Errors
-    /// If the emulator has ended, or reads nothing within the limit.
+    /// If the emulator has ended, or reads nothing within the limit, or the answer has a captured
+    /// duty that the link cannot carry.
     pub fn send(&mut self, answer: &ToEcu) -> Result<(), RunError> {
+        let Transport {
+            ref tick,
+            duty_code: sent,
+            ..
+        } = self.transport;
+        let captured = answer.packet.duty_code;
+        if tick.is_some() && captured != sent {
+            return Err(RunError::CapturedDuty { sent, captured });
+        }
         let sent = self.transport.send(answer, self.limit);
         sent.map_err(|error| self.lost(&error))
     }
@@ -242,12 +277,19 @@ impl Pipes {
     }
 
     /// Opens the link after the emulator has opened its end.
-    fn open(self, attended: &mut Attended, limit: Duration) -> Result<Transport, RunError> {
+    fn open(
+        self,
+        attended: &mut Attended,
+        link: LinkKind,
+        limit: Duration,
+    ) -> Result<Transport, RunError> {
         Ok(Transport {
             from_ecu: self.from_ecu,
             to_ecu: retry(attended, limit, || {
                 open_without_waiting(&self.to_ecu, false)
             })?,
+            tick: matches!(link, LinkKind::Ticks | LinkKind::MeasuredTicks).then(Periods::default),
+            duty_code: 0,
         })
     }
 }
@@ -279,12 +321,46 @@ fn retry<T>(
 
 impl Transport {
     fn receive(&mut self, limit: Duration) -> std::io::Result<ToHost> {
+        if let Some(tick) = &mut self.tick {
+            let from_ecu = &mut self.from_ecu;
+            let next = tick.next_or(|| receive_tick(from_ecu, limit))?;
+            return next.ok_or(ErrorKind::InvalidData.into());
+        }
         let mut bytes = [0; TO_HOST_LEN];
         read_exact(&mut self.from_ecu, limit, &mut bytes)?;
         Ok(ToHost::decode(&bytes))
     }
 
     fn send(&mut self, answer: &ToEcu, limit: Duration) -> std::io::Result<()> {
+        let Some(tick) = &mut self.tick else {
+            return write_all(&mut self.to_ecu, limit, &answer.encode());
+        };
+        if answer.stop {
+            tick.clear();
+        }
+        if !tick.is_last() {
+            return Ok(());
+        }
+        let answer = TickToEcu {
+            frame: answer.packet.frame,
+            stop: answer.stop,
+        };
         write_all(&mut self.to_ecu, limit, &answer.encode())
+    }
+}
+
+/// Reads the message of a control tick. The ECU waits for the answer, so nothing follows it.
+fn receive_tick(from_ecu: &mut File, limit: Duration) -> std::io::Result<Vec<ToHost>> {
+    let mut bytes = [0; MAX_TICK_TO_HOST_LEN];
+    let mut length = read_some(from_ecu, limit, &mut bytes)?;
+    loop {
+        let whole = TickToHost::length(&bytes[..length]).unwrap_or(2);
+        if whole > bytes.len() || length > whole {
+            return Err(ErrorKind::InvalidData.into());
+        }
+        if length == whole {
+            return Ok(TickToHost::periods(&bytes[..length]).collect());
+        }
+        length += read_some(from_ecu, limit, &mut bytes[length..whole])?;
     }
 }

@@ -29,7 +29,8 @@ use toml::{Table, Value};
   sim-host firmware run --machine mps2-an500 --time-out 60 \\
       target/thumbv7em-none-eabihf/firmware/bench run.duration_s=5
 
-Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME and telemetry=FILE.
+Settings are the keys of `sim-host config`, with a dot between section and name, plus preset=NAME, telemetry=FILE and, for the
+image `bench`, pace=host: each PWM period begins when the work of the last one is done, without timing (default: pace=timer).
 Exit codes are the firmware's: 0 complete, confirmed by log and telemetry; 10 scenario rejected, 11 telemetry, 12 overrun, 13 panic,
 14 hard fault, 15 watchdog, 16 unexpected interrupt. The exit code is 2 if the image could not be run or did not end in time.
 The image `ecu` takes no settings and does not end: its log and its status are printed until --time-out or Ctrl-C."
@@ -53,8 +54,9 @@ pub struct Arguments {
 
 /// Keys of settings that are not parameters of a scenario: for every image, and for the fault
 /// drill.
-const OWN_KEYS: [&str; 2] = [TELEMETRY, "fault="];
+const OWN_KEYS: [&str; 3] = [TELEMETRY, PACE, "fault="];
 const TELEMETRY: &str = "telemetry=";
+const PACE: &str = "pace=";
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let time_out = crate::cli::options::time_out(arguments.time_out)?;

@@ -209,10 +209,7 @@ impl Link {
 
 /// The frame with another header.
 fn protected(mut frame: FrameBytes, data_id: u16, counter: u8) -> FrameBytes {
-    let mut sender = Sender::new(data_id);
-    for _ in 0..=counter {
-        sender.protect(&mut frame);
-    }
+    Sender::starting_at(data_id, counter).protect(&mut frame);
     frame
 }
 

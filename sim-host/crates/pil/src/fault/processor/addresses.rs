@@ -38,7 +38,8 @@ impl Addresses {
             control_interrupt: symbol("PendSV")?,
             control_bytes: size("PendSV")?,
             control_ticks: part("13CONTROL_TICKS")?,
-            idle: part("$GT$4idle17h")?,
+            // Under the compiler's former and its present scheme of symbol names.
+            idle: part("4idle")?,
             stack_end: symbol("_stack_end")?,
             stack_start: symbol("_stack_start")?,
             return_code: image
