@@ -6,8 +6,8 @@ use shared_model::Scenario;
 use shared_model::configuration::{CONFIGURATION_LEN, ConfigurationError, ERASED, load};
 
 /// The blocks. Erased in the image that the linker makes.
+// SAFETY: constants in a part of the flash of their own; nothing else has this name.
 #[unsafe(link_section = ".configuration")]
-// SAFETY: nothing else has this name; the host finds the section by it.
 #[unsafe(export_name = "CONFIGURATION")]
 static BLOCKS: [u8; CONFIGURATION_LEN] = [ERASED; CONFIGURATION_LEN];
 

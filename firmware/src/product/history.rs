@@ -5,6 +5,7 @@ use core::ptr::{read_volatile, write_volatile};
 use shared_model::diagnostic::{HISTORY_WORDS, History, Record};
 
 /// Outside `.data` and `.bss`, so it survives a reset.
+// SAFETY: without a start value, and any words are some words.
 #[unsafe(link_section = ".uninit.history")]
 static mut WORDS: MaybeUninit<[u32; HISTORY_WORDS]> = MaybeUninit::uninit();
 

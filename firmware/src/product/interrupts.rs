@@ -97,8 +97,8 @@ impl ControlInterrupt {
 /// Written by each control tick after its duties and frames, and before its input is taken: a
 /// debugger that plays the vehicle watches it. Not zeroed by the start-up code, which would be a
 /// write, too.
+// SAFETY: without a start value, and never read; nothing else has this name.
 #[unsafe(link_section = ".uninit.mark")]
-// SAFETY: nothing else has this name.
 #[unsafe(export_name = "BEFORE_SENSOR_FRAME")]
 static mut MARK: MaybeUninit<u32> = MaybeUninit::uninit();
 

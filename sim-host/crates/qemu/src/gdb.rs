@@ -125,7 +125,7 @@ impl Gdb {
 
     /// Stops the core after each write to the word at `address`.
     ///
-    /// After a breakpoint the emulator translates the whole program anew; after this it does not.
+    /// After a breakpoint the emulator translates the whole program again; after this it does not.
     ///
     /// # Errors
     /// If the stub rejects the request or does not answer.
