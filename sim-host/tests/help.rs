@@ -11,9 +11,10 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// Subcommands whose examples need QEMU or what was made in it.
-const WITH_FIRMWARE: [&str; 5] = [
+const WITH_FIRMWARE: [&str; 6] = [
     "verify",
     "pil",
+    "firmware configure",
     "firmware image",
     "firmware run",
     "firmware decode",

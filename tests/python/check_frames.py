@@ -3,7 +3,7 @@
 The DBC files, for CAN FD and for classic CAN, are named on the command line. Each line on standard input gets one line in answer:
 
 MESSAGE      what the DBC file says of the message: key=value ...
-MESSAGE HEX  the bytes protected anew, the verdict of the check on the bytes as they are, then signal=value ...
+MESSAGE HEX  the bytes protected anew, the verdict of the check on the bytes as they are, then signal=value ... of a whole frame
 classic MESSAGE HEX  signal=value ... of the three frames on classic CAN
 """
 
@@ -63,7 +63,9 @@ def answer(message, data=None):
     data = bytes.fromhex(data)
     data_id = attribute(message, "E2EDataId")
     verdict = "whole" if p05.e2e_p05_check(data, data_id) else "error"
-    return [protected(data, data_id), verdict, *pairs(message.decode(data))]
+    # The signals of a damaged frame mean nothing, and may have no kind of message to them.
+    signals = pairs(message.decode(data)) if verdict == "whole" else []
+    return [protected(data, data_id), verdict, *signals]
 
 
 def classic_answer(name, data):

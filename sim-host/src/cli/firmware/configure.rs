@@ -27,7 +27,8 @@ use std::path::{Path, PathBuf};
   sim-host firmware configure --config vehicle.toml --out ecu-vehicle.elf \\
       target/thumbv7em-none-eabihf/firmware/ecu
   sim-host firmware configure --show ecu-vehicle.elf
-  sim-host firmware configure --config vehicle.toml --calibrate --out ecu.hex ecu-vehicle.elf
+  sim-host firmware configure --config vehicle.toml --calibrate \\
+      --out ecu.hex ecu-vehicle.elf
 
 The format follows from the name of the output: .bin (from the first address, gaps as erased flash), .hex (Intel HEX), else ELF.
 Without --config the parameters are the preset's. The start time of the dither is 0 in the image: that of the paper belongs to its
