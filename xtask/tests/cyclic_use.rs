@@ -68,6 +68,9 @@ impl Crate {
             let texts = lexemes[at..].iter().take(7).map(|lexeme| lexeme.0.as_str());
             if texts.eq(["#", "[", "cfg", "(", "test", ")", "]"]) {
                 at = end_of_item(lexemes, at + 7);
+            } else if word == "#" && is(at + 1, "[") && is(at + 2, "path") {
+                // A file of another crate, which is read there.
+                at = end_of_item(lexemes, at);
             } else if word == "mod" && (is(at + 2, ";") || is(at + 2, "{")) {
                 let name = lexemes[at + 1].0.clone();
                 let child = child(&module, &name);
