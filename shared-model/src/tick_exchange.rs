@@ -1,7 +1,7 @@
 //! The exchange once per control tick: duty codes and bridge of all its PWM periods in one message.
 //!
 //! The duty that is captured on the servo's pin is then the ECU's own, so this exchange has no
-//! faults behind the pin; the one per PWM period (module `exchange`) has. A tick has at most
+//! faults after the pin; the one per PWM period (module `exchange`) has. A tick has at most
 //! [`MAX_RATIO`] periods, and the length of its message is that of its periods:
 //!
 //! | bytes | content |

@@ -120,12 +120,14 @@ fn steer(scenario: &Scenario<f32>, ecu: Ecu<f32>, bus: ProductBus, start: Start)
     let healthy_ticks = (HEALTHY_S * rate_hz) as u32;
     let mut ticks_seen = 0;
     let mut mode_seen = Mode::Starting;
+    let mut is_healthy = false;
     loop {
         let ticks = steering::control_ticks();
         if ticks != ticks_seen {
             ticks_seen = ticks;
             Current::feed_watchdog();
-            if ticks == healthy_ticks {
+            if ticks >= healthy_ticks && !is_healthy {
+                is_healthy = true;
                 forget_faults_in_a_row();
             }
         }

@@ -78,7 +78,7 @@ pub enum RunError {
         /// The last log line.
         last_line: String,
     },
-    /// A fault behind the servo's pin, over a link that has none.
+    /// A fault after the servo's pin, over a link that has none.
     #[error(
         "the duty captured on the servo's pin is not the one that the firmware put out ({sent} counts), but {captured} counts: the link `ticks` cannot carry it; use `files` or `timed`"
     )]
