@@ -18,7 +18,7 @@ pub struct Command<T> {
 
 /// The controller, run once per control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Controller<T> {
+pub struct Controller<T: Real> {
     policy: Policy<T>,
     schedule: Table<T>,
     winding_resistance_ohm: T,

@@ -27,7 +27,7 @@ use crate::{InvalidScenario, Real, Scenario};
 
 /// The whole program, its tasks run in turn.
 #[derive(Debug, Clone)]
-pub struct Ecu<T> {
+pub struct Ecu<T: Real> {
     /// The task at the PWM rate.
     pub pwm: PwmTask<T>,
     /// The task at the control rate.

@@ -63,6 +63,10 @@ pub trait Real:
     fn is_finite(self) -> bool {
         self.to_f64().is_finite()
     }
+    /// Bits in which the values of two numbers differ; 0 only if all bits are equal.
+    fn differing_bits(self, other: Self) -> u64 {
+        self.to_f64().to_bits() ^ other.to_f64().to_bits()
+    }
 }
 
 impl Real for f32 {
@@ -101,6 +105,10 @@ impl Real for f32 {
     // The default goes through f64, which the ECU would emulate in software.
     fn is_finite(self) -> bool {
         f32::is_finite(self)
+    }
+    // As above.
+    fn differing_bits(self, other: Self) -> u64 {
+        u64::from(self.to_bits() ^ other.to_bits())
     }
 }
 

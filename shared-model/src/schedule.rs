@@ -5,9 +5,9 @@
 use crate::Real;
 
 /// Amplitudes of one waveform at equally spaced wheel speeds. Small and `Copy`: each channel of the
-/// ECU holds its own in RAM.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Schedule<T, const POINTS: usize> {
+/// ECU holds its own in RAM. Two schedules are equal if all bits of their numbers are.
+#[derive(Debug, Clone, Copy)]
+pub struct Schedule<T: Real, const POINTS: usize> {
     /// First wheel speed, rpm. Below it the dither is off.
     pub first_rpm: T,
     /// From one wheel speed to the next, rpm; greater than 0.
@@ -64,12 +64,22 @@ impl<T: Real, const POINTS: usize> Schedule<T, POINTS> {
     }
 
     /// The same schedule in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> Schedule<U, POINTS> {
+    pub fn map<U: Real>(&self, f: &impl Fn(T) -> U) -> Schedule<U, POINTS> {
         Schedule {
             first_rpm: f(self.first_rpm),
             step_rpm: f(self.step_rpm),
             amplitudes_v: self.amplitudes_v.map(f),
         }
+    }
+}
+
+/// Without a branch per number: the channels of the ECU are compared in every control tick.
+impl<T: Real, const POINTS: usize> PartialEq for Schedule<T, POINTS> {
+    fn eq(&self, other: &Self) -> bool {
+        let speeds = self.first_rpm.differing_bits(other.first_rpm)
+            | self.step_rpm.differing_bits(other.step_rpm);
+        let amplitudes = self.amplitudes_v.iter().zip(&other.amplitudes_v);
+        amplitudes.fold(speeds, |bits, (a, b)| bits | a.differing_bits(*b)) == 0
     }
 }
 

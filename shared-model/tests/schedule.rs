@@ -86,3 +86,23 @@ proptest! {
         prop_assert!(next_to_an_entry || in_f64 == f64::from(amplitude_v));
     }
 }
+
+/// The sign of a zero too, which no comparison of numbers finds.
+#[test]
+fn a_schedule_with_any_bit_flipped_is_another() {
+    for bit in 0..64 {
+        let flip = |number: &mut f64| *number = f64::from_bits(number.to_bits() ^ (1 << bit));
+        let mut flipped = [SCHEDULE; 6];
+        flip(&mut flipped[0].first_rpm);
+        flip(&mut flipped[1].step_rpm);
+        for point in 0..4 {
+            flip(&mut flipped[2 + point].amplitudes_v[point]);
+        }
+        assert!(flipped.iter().all(|other| *other != SCHEDULE), "bit {bit}");
+        let narrow = SCHEDULE.map(&|value| value as f32);
+        let mut other = narrow;
+        other.amplitudes_v[0] = f32::from_bits(1 << (bit % 32));
+        assert!(other != narrow, "bit {bit}");
+    }
+    assert!(SCHEDULE == SCHEDULE.map(&|value| value));
+}

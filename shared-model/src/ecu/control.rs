@@ -48,7 +48,7 @@ pub struct ControlOutput<T> {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Channel<T> {
+struct Channel<T: Real> {
     reception: Reception,
     measurement: Option<Measurement<T>>,
     controller: Controller<T>,
@@ -67,7 +67,9 @@ impl<T: Real> Channel<T> {
             .map(|frame| decode_measurement(frame).map(&|signal| T::from_f64(signal.into())));
         // The gate finds a signal that is not a number. It must not enter the state: NaN is not equal
         // to itself, so that the channels would differ for good.
-        self.measurement = new.filter(Measurement::is_finite).or(self.measurement);
+        if new.is_some_and(|new| new.is_finite()) {
+            self.measurement = new;
+        }
         let is_active = self.supervisor.mode() == Mode::Active;
         let mut found_outside = found_outside;
         found_outside.add_if(received.is_invalid && is_active, Fault::FramesInvalid);
@@ -118,7 +120,7 @@ impl<T: Real> Channel<T> {
 
 /// The task at the control rate.
 #[derive(Debug, Clone)]
-pub struct ControlTask<T> {
+pub struct ControlTask<T: Real> {
     channels: DualChannel<Channel<T>>,
     frames_differed: bool,
 }

@@ -40,9 +40,11 @@ impl<T: Real> Plausibility<T> {
         &self.limits
     }
 
-    /// The last wheel speed, rpm; `None` before the first measurement.
-    pub fn wheel_speed_rpm(&self) -> Option<T> {
-        self.last.map(|last| last.wheel_speed_rpm)
+    /// Whether the dither must be present at the last wheel speed; not before the first measurement.
+    pub fn is_dither_needed(&self) -> bool {
+        let above_rpm = self.limits.dither_above_rpm;
+        self.last
+            .is_some_and(|last| last.wheel_speed_rpm > above_rpm)
     }
 
     /// A control tick; `measurement` is new, or `None` if there was none. Returns the faults found.

@@ -48,10 +48,9 @@ struct CommandLimits<T> {
     dither_amplitude_v: T,
 }
 
-/// The least dither, above a wheel speed.
+/// The least dither at the wheel speeds that need it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct LeastDither<T> {
-    above_rpm: T,
     amplitude_v: T,
     /// Most consecutive control ticks with less.
     max_weak_ticks: u32,
@@ -66,7 +65,6 @@ impl<T: Real> LeastDither<T> {
         let limits = &scenario.gate;
         let ticks = |time_s: T| (time_s * scenario.run.control_rate_hz + T::from_f64(0.5)).to_u32();
         Self {
-            above_rpm: limits.dither_above_rpm,
             amplitude_v: match scenario.dither.waveform {
                 Waveform::None => T::zero(),
                 Waveform::Square => limits.square_least_amplitude_v,
@@ -79,12 +77,11 @@ impl<T: Real> LeastDither<T> {
     }
 
     /// A control tick of an active ECU; returns whether the dither has been too weak for too long.
-    fn is_missed(&mut self, wheel_speed_rpm: Option<T>, amplitude_v: T) -> bool {
+    fn is_missed(&mut self, is_needed: bool, amplitude_v: T) -> bool {
         if self.ticks_to_start > 0 {
             self.ticks_to_start -= 1;
             return false;
         }
-        let is_needed = wheel_speed_rpm.is_some_and(|speed_rpm| speed_rpm > self.above_rpm);
         self.weak_ticks = if is_needed && amplitude_v < self.amplitude_v {
             self.weak_ticks.saturating_add(1)
         } else {
@@ -207,10 +204,9 @@ impl<T: Real> Supervisor<T> {
         }
         let is_old = self.age_ticks > self.frame_age_ticks;
         faults.add_if(is_old, Fault::FrameAge);
-        let speed_rpm = self.plausibility.wheel_speed_rpm();
-        let is_missed = self
-            .least_dither
-            .is_missed(speed_rpm, seen.dither_amplitude_v);
+        let is_needed = self.plausibility.is_dither_needed();
+        let amplitude_v = seen.dither_amplitude_v;
+        let is_missed = self.least_dither.is_missed(is_needed, amplitude_v);
         faults.add_if(is_missed, Fault::DitherWeak);
         let (least, most) = self.window_counts;
         let in_time = (least..=most).contains(&seen.elapsed_counts);

@@ -42,7 +42,7 @@ fn counts_per_tick<T: Real>(scenario: &Scenario<T>) -> u32 {
 /// without the ECU's tasks and without the end-to-end check of the sensor frames: every frame is
 /// taken as whole, and only its freshness is checked. It verifies that tasks, channels and frames do
 /// not change the commands.
-pub struct Model<T> {
+pub struct Model<T: Real> {
     controller: Controller<T>,
     supervisor: Supervisor<T>,
     limiter: Limiter<T>,
