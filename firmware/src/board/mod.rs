@@ -110,6 +110,9 @@ pub trait Board {
     /// Sends a byte if there is room for it now.
     fn uart_send(byte: u8) -> bool;
 
+    /// Interrupts on received bytes, or no more. Called with interrupts masked, or by the UART's own.
+    fn uart_interrupt_on_byte(on: bool);
+
     /// Interrupts also when there is room to send.
     fn uart_interrupt_on_room(on: bool);
 

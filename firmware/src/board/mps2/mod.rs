@@ -47,6 +47,7 @@ const UART_TX_FULL: u32 = 1;
 const UART_RX_FULL: u32 = 2;
 /// Sender, receiver, and an interrupt of each.
 const UART_ON: u32 = 0b1111;
+const UART_RX_INTERRUPT: u32 = 0b1000;
 const UART_INTERRUPT_BITS: u32 = 0b1111;
 /// 1 Mbit/s.
 const UART_DIVIDER: u32 = CLOCK_HZ / 1_000_000;
@@ -257,6 +258,16 @@ impl Board for Mps2 {
             }
             has_room
         }
+    }
+
+    fn uart_interrupt_on_byte(on: bool) {
+        let control = if on {
+            UART_ON
+        } else {
+            UART_ON & !UART_RX_INTERRUPT
+        };
+        // SAFETY: a write to the UART's control register.
+        unsafe { write_volatile(UART1_CTRL, control) };
     }
 
     /// It interrupts after each byte sent, whatever follows.

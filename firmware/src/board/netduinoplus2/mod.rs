@@ -203,6 +203,12 @@ impl Board for NetduinoPlus2 {
         has_room
     }
 
+    fn uart_interrupt_on_byte(on: bool) {
+        // SAFETY: nothing else uses the UART.
+        let uart = unsafe { &*pac::USART1::ptr() };
+        uart.cr1().modify(|_, w| w.rxneie().bit(on));
+    }
+
     fn uart_interrupt_on_room(on: bool) {
         // SAFETY: nothing else uses the UART.
         let uart = unsafe { &*pac::USART1::ptr() };

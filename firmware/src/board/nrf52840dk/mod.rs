@@ -328,15 +328,23 @@ impl Board for Nrf52840Dk {
         has_room
     }
 
+    fn uart_interrupt_on_byte(on: bool) {
+        interrupt_on(RECEIVED | ERROR, on);
+    }
+
     fn uart_interrupt_on_room(on: bool) {
-        let uart = uart();
-        // SAFETY: one bit of the mask of interrupts.
-        unsafe {
-            if on {
-                uart.intenset.write(|w| w.bits(SENT));
-            } else {
-                uart.intenclr.write(|w| w.bits(SENT));
-            }
+        interrupt_on(SENT, on);
+    }
+}
+
+/// Interrupts of the UART on these events, or no more.
+fn interrupt_on(events: u32, on: bool) {
+    // SAFETY: bits of the mask of interrupts.
+    unsafe {
+        if on {
+            uart().intenset.write(|w| w.bits(events));
+        } else {
+            uart().intenclr.write(|w| w.bits(events));
         }
     }
 }
