@@ -53,14 +53,10 @@ pub trait ParameterSet<T: Real>: Copy + 'static {
         Some((field.min, field.max))
     }
 
-    /// Sets the number called `name`; `false` if the set has none of that name. The value is not
-    /// checked.
-    fn set(&mut self, name: &str, value: T) -> bool {
-        let field = Self::FIELDS.iter().find(|field| field.name == name);
-        if let Some(field) = field {
-            *(field.accessor)(self) = value;
-        }
-        field.is_some()
+    /// The number called `name`; `None` if the set has none of that name.
+    fn number(&mut self, name: &str) -> Option<&mut T> {
+        let field = Self::FIELDS.iter().find(|field| field.name == name)?;
+        Some((field.accessor)(self))
     }
 }
 

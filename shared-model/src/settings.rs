@@ -117,6 +117,33 @@ impl<T: Real> Scenario<T> {
     }
 }
 
+impl<T: Real> Scenario<T> {
+    /// The number `section.name`; `None` if there is none of that name.
+    ///
+    /// ```
+    /// use shared_model::Scenario;
+    /// let mut scenario = Scenario::<f64>::reconstruction();
+    /// assert_eq!(scenario.number("run.wheel_speed_rpm"), Some(&mut 1750.0));
+    /// assert_eq!(scenario.number("vehicle.slip_form"), None);
+    /// ```
+    pub fn number(&mut self, key: &str) -> Option<&mut T> {
+        let (section, name) = key.rsplit_once('.')?;
+        match section {
+            "vehicle" => self.vehicle.number(name),
+            "tires.front" => self.tires.front.number(name),
+            "tires.rear" => self.tires.rear.number(name),
+            "steering" => self.steering.number(name),
+            "friction" => self.friction.number(name),
+            "dither" => self.dither.number(name),
+            "servo" => self.servo.number(name),
+            "policy" => self.policy.number(name),
+            "gate" => self.gate.number(name),
+            "run" => self.run.number(name),
+            _ => None,
+        }
+    }
+}
+
 impl<T: Real + FromStr> Scenario<T> {
     /// Takes one setting: `preset=NAME`, which replaces everything before it, or
     /// `section.name=value`. The value's range is not checked here but by
@@ -148,30 +175,10 @@ impl<T: Real + FromStr> Scenario<T> {
     }
 
     fn set_number(&mut self, key: &str, value: &str) -> Result<(), SettingError> {
-        let (section, name) = key.rsplit_once('.').ok_or(SettingError::UnknownKey)?;
-        let parsed = value.parse();
         // The key is checked first: a misspelt choice, whose value is no number, is reported as an
         // unknown key.
-        let mut changed = *self;
-        let number = parsed.as_ref().map_or(T::zero(), |&number| number);
-        let known = match section {
-            "vehicle" => changed.vehicle.set(name, number),
-            "tires.front" => changed.tires.front.set(name, number),
-            "tires.rear" => changed.tires.rear.set(name, number),
-            "steering" => changed.steering.set(name, number),
-            "friction" => changed.friction.set(name, number),
-            "dither" => changed.dither.set(name, number),
-            "servo" => changed.servo.set(name, number),
-            "policy" => changed.policy.set(name, number),
-            "gate" => changed.gate.set(name, number),
-            "run" => changed.run.set(name, number),
-            _ => false,
-        };
-        if !known {
-            return Err(SettingError::UnknownKey);
-        }
-        parsed.map_err(|_| SettingError::NotANumber)?;
-        *self = changed;
+        let number = self.number(key).ok_or(SettingError::UnknownKey)?;
+        *number = value.parse().map_err(|_| SettingError::NotANumber)?;
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 pub mod dual;
 mod early_end;
-mod events;
+pub mod events;
 pub mod reference;
 pub mod rounding;
 mod stepper;

@@ -1,0 +1,14 @@
+#![doc = include_str!("../README.md")]
+
+pub mod arclength;
+pub mod branch;
+mod failure;
+pub mod orbit;
+pub mod start;
+pub mod system;
+mod test_function;
+pub mod trajectory;
+pub mod vehicle;
+
+pub use failure::Failure;
+pub use test_function::Bifurcation;

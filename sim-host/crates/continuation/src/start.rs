@@ -1,0 +1,94 @@
+//! Guesses for periodic orbits: near returns of a trajectory.
+
+use crate::failure::Failure;
+use crate::system::{Equations, Parameters, System};
+use crate::trajectory::integrate;
+use nalgebra::SVector;
+
+/// A guess for a periodic orbit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearReturn<const N: usize> {
+    /// Where it starts.
+    pub start: SVector<f64, N>,
+    /// When it returns, s.
+    pub period_s: f64,
+    /// Number of crossings of the section, one per cycle.
+    pub cycles: usize,
+    /// Distance between start and return, as a share of the trajectory's extent.
+    pub distance: f64,
+}
+
+/// The nearest return after each number of cycles up to `most_cycles`, ascending: of the trajectory
+/// from `start` after `transient_s`, over `observed_s`. A cycle is from one rise of a component through
+/// the middle of its range to the next.
+///
+/// # Errors
+/// If the trajectory diverges or rests.
+pub fn near_returns<S: System<N>, const N: usize>(
+    system: &S,
+    parameters: Parameters<f64>,
+    start: &SVector<f64, N>,
+    component: usize,
+    transient_s: f64,
+    observed_s: f64,
+    most_cycles: usize,
+    tolerance: f64,
+) -> Result<Vec<NearReturn<N>>, Failure> {
+    let settled = integrate(system, parameters, start, transient_s, tolerance)?;
+    let observed = integrate(system, parameters, settled.end(), observed_s, tolerance)?;
+    let (low, high) = observed.extent();
+    let extent = high - low;
+    if extent
+        .component_div(&low.abs().sup(&high.abs()).add_scalar(f64::MIN_POSITIVE))
+        .amax()
+        < 1e-4
+    {
+        return Err(Failure::AtRest);
+    }
+    let level = 0.5 * (low[component] + high[component]);
+    let times_s = observed.times_s();
+    let equations = system.equations(parameters);
+    let crossings: Vec<(f64, SVector<f64, N>)> = (0..observed.legs.len())
+        .filter_map(|k| {
+            let [before, after] = [observed.states[k], observed.states[k + 1]];
+            let rises = before[component] < level && after[component] >= level;
+            let mode = observed.legs[k].mode;
+            if !rises || equations.is_confined(mode) {
+                return None;
+            }
+            // The rest is Newton's method's: to the level by a few steps along the flow.
+            let (mut time_s, mut x) = (0.0, before);
+            for _ in 0..4 {
+                let rates = equations.derivative(&x, mode);
+                let next_s = time_s + (level - x[component]) / rates[component];
+                if !(0.0..=observed.legs[k].step_s).contains(&next_s) {
+                    break;
+                }
+                x = *integrate(system, parameters, &before, next_s, tolerance)
+                    .ok()?
+                    .end();
+                time_s = next_s;
+            }
+            Some((times_s[k] + time_s, x))
+        })
+        .collect();
+    let least = 1e-3 * extent.amax();
+    let size = extent.map(|extent| extent.max(least));
+    let mut found = Vec::new();
+    for cycles in 1..=most_cycles.min(crossings.len().saturating_sub(1)) {
+        let pairs = crossings.iter().zip(&crossings[cycles..]);
+        let returns = pairs.map(|(from, to)| NearReturn {
+            start: from.1,
+            period_s: to.0 - from.0,
+            cycles,
+            distance: (to.1 - from.1).component_div(&size).amax(),
+        });
+        found.extend(returns.min_by(|a, b| a.distance.total_cmp(&b.distance)));
+    }
+    if found.is_empty() {
+        return Err(Failure::NoReturn {
+            longest_s: observed_s,
+        });
+    }
+    Ok(found)
+}
