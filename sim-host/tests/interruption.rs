@@ -61,6 +61,7 @@ fn sigterm_ends_every_long_job() {
             "synchronisation",
         ],
         &["orbit", "--time", "400000", "--out", "orbit.csv"],
+        &["continue", "--transient", "100000", "--out", "branches.csv"],
         &["regions", "--time", "400000", "--out", "regions.csv"],
         &["basin", "--time", "400000", "--out", "basin.csv"],
         &["phase", "--transient", "100000", "--out", "phase.csv"],

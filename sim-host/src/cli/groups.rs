@@ -41,6 +41,10 @@ const GROUPS: [Group; 4] = [
                 "orbit diagram over wheel speed or dither amplitude",
             ),
             (
+                "continue",
+                "branches of periodic orbits, with their bifurcations",
+            ),
+            (
                 "regions",
                 "regimes along a parameter, with their edges bisected",
             ),

@@ -7,6 +7,7 @@ mod stdout;
 mod averaging;
 mod basin;
 mod config;
+mod continuation;
 mod convergence;
 mod emulator;
 mod equilibria;
@@ -66,6 +67,7 @@ enum Command {
     Averaging(averaging::Arguments),
     Convergence(convergence::Arguments),
     Orbit(orbit::Arguments),
+    Continue(continuation::Arguments),
     Regions(regions::Arguments),
     Equilibria(equilibria::Arguments),
     Basin(basin::Arguments),
@@ -132,6 +134,7 @@ fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Averaging(arguments) => averaging::run(&arguments),
         Command::Convergence(arguments) => convergence::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Continue(arguments) => continuation::run(&arguments),
         Command::Regions(arguments) => regions::run(&arguments),
         Command::Equilibria(arguments) => equilibria::run(&arguments),
         Command::Basin(arguments) => basin::run(&arguments),

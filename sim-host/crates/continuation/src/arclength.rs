@@ -9,6 +9,9 @@ use nalgebra::{DMatrix, DVector};
 /// Size of a correction, in the scales, at which Newton's method has converged: the next one would be
 /// its square.
 const CONVERGED: f64 = 1e-8;
+/// Size below which a correction that is no longer much less than the last one is rounding: that of an
+/// unstable orbit is its multiplier's.
+const STAGNANT: f64 = 1e-5;
 /// Corrections of Newton's method; a good guess needs three.
 const MOST_CORRECTIONS: usize = 10;
 /// A correction beyond this, in the scales, leads elsewhere.
@@ -109,10 +112,13 @@ pub fn correct<P: Problem>(
             return Err(Failure::NotConverged { correction: size });
         }
         unknowns -= correction.component_mul(scales);
-        if size < CONVERGED {
-            // The derivatives are those one correction ago, which is beyond their accuracy.
+        let stagnates = size < STAGNANT && size > 0.1 * last;
+        if size < CONVERGED || stagnates {
+            // The solution is that of the last unknowns; the next correction would be rounding.
+            let evaluation = problem.evaluate(&unknowns)?;
             let mut along = DVector::zeros(right.len());
             along[right.len() - 1] = 1.0;
+            let lu = bordered(&evaluation.jacobian, scales, tangent).lu();
             let along = lu.solve(&along).ok_or(Failure::Singular)?;
             return Ok(Point {
                 unknowns,
@@ -154,6 +160,8 @@ pub struct Settings {
     pub shortest_step: f64,
     /// Most points.
     pub most_points: usize,
+    /// Magnitude of a multiplier beyond which an orbit is not followed.
+    pub greatest_multiplier: f64,
 }
 
 impl Settings {
@@ -164,6 +172,7 @@ impl Settings {
             longest_step: 0.03,
             shortest_step: 1e-7,
             most_points: 1000,
+            greatest_multiplier: 1e4,
         }
     }
 
@@ -182,6 +191,9 @@ pub enum End {
     Equilibrium,
     /// The period grows beyond its bound.
     LongPeriod,
+    /// A multiplier is so great that a trajectory leaves the orbit within a period: it is nearly homoclinic,
+    /// or needs more segments.
+    TooUnstable,
     /// The curve is closed: it is back where it began.
     Closed,
     /// The greatest number of points is reached.
@@ -198,6 +210,7 @@ impl std::fmt::Display for End {
             Self::Range => "a parameter is at the end of its range",
             Self::Equilibrium => "the orbit shrinks to an equilibrium",
             Self::LongPeriod => "the period grows without bound",
+            Self::TooUnstable => "a multiplier grows without bound, as near a homoclinic orbit",
             Self::Closed => "the branch is closed",
             Self::Points => "the greatest number of points is reached",
             Self::Failed(failure) => return failure.fmt(f),
@@ -245,7 +258,7 @@ pub fn walk<P: Problem>(
     }
     let mut step = settings.longest_step;
     for _ in 1..settings.most_points {
-        (problem, point) = match rebase(&problem, &point) {
+        (problem, point.unknowns, point.tangent) = match problem.rebased(&point) {
             Ok(rebased) => rebased,
             Err(failure) => return Ok(End::Failed(failure)),
         };
@@ -276,19 +289,6 @@ pub fn walk<P: Problem>(
         point = next;
     }
     Ok(End::Points)
-}
-
-/// The same point in better terms.
-fn rebase<P: Problem>(
-    problem: &P,
-    point: &Point<P::Solution>,
-) -> Result<(P, Point<P::Solution>), Failure> {
-    let (problem, unknowns, tangent) = problem.rebased(point)?;
-    let mut rebased = correct(&problem, unknowns, &tangent)?;
-    if rebased.tangent.dot(&tangent) < 0.0 {
-        rebased.tangent = -rebased.tangent;
-    }
-    Ok((problem, rebased))
 }
 
 /// The next point, at the greatest arclength that works.

@@ -29,11 +29,9 @@ pub struct Special<M, const N: usize> {
     /// Error of the parameter there: difference to the location at a looser tolerance, and width of the
     /// location.
     pub parameter_error: f64,
-    /// Number of the branch's orbit before it.
-    pub after: usize,
 }
 
-/// A branch: orbits in the order of arclength, and the bifurcations between them.
+/// A branch: orbits in the order of arclength, those at its bifurcations among them.
 #[derive(Debug, Clone)]
 pub struct Branch<M, const N: usize> {
     /// The orbits.
@@ -73,9 +71,10 @@ pub fn follow<S: System<N>, const N: usize, const K: usize>(
         |step| {
             let orbit = &step.to.solution;
             if !branch.orbits.is_empty() {
-                branch
-                    .specials
-                    .extend(specials(&step, branch.orbits.len() - 1));
+                for special in specials(&step) {
+                    branch.orbits.push(special.orbit.clone());
+                    branch.specials.push(special);
+                }
             }
             branch.orbits.push(orbit.clone());
             if !see(orbit) {
@@ -87,6 +86,10 @@ pub fn follow<S: System<N>, const N: usize, const K: usize>(
             }
             if orbit.period_s > LONGEST_PERIOD * first.period_s {
                 return Some(End::LongPeriod);
+            }
+            let largest = orbit.multipliers.first();
+            if largest.is_some_and(|multiplier| multiplier.norm() > settings.greatest_multiplier) {
+                return Some(End::TooUnstable);
             }
             is_closed(&branch.orbits, settings).then_some(End::Closed)
         },
@@ -115,10 +118,9 @@ fn is_closed<M: Copy + PartialEq, const N: usize>(
 
 fn specials<S: System<N>, const N: usize, const K: usize>(
     step: &Step<'_, Shooting<'_, S, N, K>>,
-    after: usize,
 ) -> Vec<Special<S::Mode, N>> {
     let has = |kind: &&Bifurcation| has_between(**kind, step);
-    let located = |kind: &Bifurcation| special(*kind, step, after);
+    let located = |kind: &Bifurcation| special(*kind, step);
     let mut found: Vec<_> = Bifurcation::ALL
         .iter()
         .filter(has)
@@ -152,7 +154,6 @@ fn has_between<S: System<N>, const N: usize, const K: usize>(
 fn special<S: System<N>, const N: usize, const K: usize>(
     kind: Bifurcation,
     step: &Step<'_, Shooting<'_, S, N, K>>,
-    after: usize,
 ) -> Option<Special<S::Mode, N>> {
     let (problem, from) = (step.problem, step.from);
     let scales = problem.scales();
@@ -186,7 +187,6 @@ fn special<S: System<N>, const N: usize, const K: usize>(
         kind,
         parameter_error: difference + width * rate + 4.0 * f64::EPSILON * parameter.abs(),
         orbit: point.solution,
-        after,
     })
 }
 

@@ -2,6 +2,8 @@
 
 pub mod arclength;
 pub mod branch;
+pub mod curve;
+pub mod equilibrium;
 mod failure;
 pub mod orbit;
 pub mod start;

@@ -28,6 +28,8 @@ pub struct Orbit<M, const N: usize> {
     pub monodromy: SMatrix<f64, N, N>,
     /// Time derivative of the state at the start.
     pub flow: SVector<f64, N>,
+    /// The monodromy matrix across the flow: its eigenvalues are the other multipliers.
+    pub across: DMatrix<f64>,
     /// Multipliers but for the one along the flow, by descending magnitude.
     pub multipliers: Vec<Complex<f64>>,
     /// Error of the multiplier along the flow, which is 1.
@@ -38,6 +40,15 @@ impl<M: Copy + PartialEq, const N: usize> Orbit<M, N> {
     /// The state at the start.
     pub fn start(&self) -> &SVector<f64, N> {
         &self.segments[0].states[0]
+    }
+
+    /// The orbit as a guess.
+    pub fn guess(&self) -> Guess<N> {
+        Guess {
+            start: *self.start(),
+            period_s: self.period_s,
+            parameters: self.parameters,
+        }
     }
 
     /// Every multiplier but the one along the flow is within the unit circle.
@@ -82,6 +93,17 @@ impl<M: Copy + PartialEq, const N: usize> Orbit<M, N> {
     }
 }
 
+/// A guess for a periodic orbit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Guess<const N: usize> {
+    /// A state on it.
+    pub start: SVector<f64, N>,
+    /// Its period, s.
+    pub period_s: f64,
+    /// The parameters.
+    pub parameters: Parameters<f64>,
+}
+
 /// The equations of a periodic orbit. `K` is `N + 2`: tangents by each component and parameter.
 #[derive(Debug)]
 pub struct Shooting<'a, S: System<N>, const N: usize, const K: usize> {
@@ -111,40 +133,37 @@ impl<S: System<N>, const N: usize, const K: usize> Clone for Shooting<'_, S, N, 
 impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
     const TANGENTS: () = assert!(K == N + 2, "K must be N + 2");
 
-    /// The equations near an orbit that starts at `start`; `spans` are the extents over which the
-    /// parameters are of interest, and `free` of them are unknown.
+    /// The equations near an orbit. `spans` are the extents over which the parameters are of interest: one
+    /// for a branch, two for a curve in both parameters.
     ///
     /// # Errors
     /// If the trajectory diverges, or rests.
-    #[allow(clippy::too_many_arguments)]
     pub fn new(
         system: &'a S,
-        start: &SVector<f64, N>,
-        period_s: f64,
-        parameters: Parameters<f64>,
-        spans: Parameters<f64>,
-        free: usize,
+        guess: &Guess<N>,
+        spans: &[f64],
         segments: usize,
         tolerance: f64,
     ) -> Result<Self, Failure> {
         let () = Self::TANGENTS;
-        let trajectory = integrate(system, parameters, start, period_s, tolerance)?;
+        let Guess {
+            start,
+            period_s,
+            parameters,
+        } = *guess;
+        let trajectory = integrate(system, parameters, &start, period_s, tolerance)?;
         let (low, high) = trajectory.extent();
         let extent = high - low;
-        let size = low.abs().sup(&high.abs());
-        if extent
-            .component_div(&size.add_scalar(f64::MIN_POSITIVE))
-            .amax()
-            < AT_REST
-        {
+        let size = low.abs().sup(&high.abs()).add_scalar(f64::MIN_POSITIVE);
+        if extent.component_div(&size).amax() < AT_REST {
             return Err(Failure::AtRest);
         }
-        let least = extent.amax() * 1e-3;
-        let extent = extent.map(|extent| extent.max(least));
+        let extent = sizes(&extent);
         let equations = system.equations(parameters);
-        let normal = equations.derivative(start, equations.mode_at(start));
+        let normal = equations.derivative(&start, equations.mode_at(&start));
         let states = (0..segments).flat_map(|_| extent.iter().copied());
-        let others = std::iter::once(period_s).chain(spans[..free].iter().copied());
+        let others = std::iter::once(period_s).chain(spans.iter().copied());
+        let free = spans.len();
         let scales = DVector::from_iterator(segments * N + 1 + free, states.chain(others));
         Ok(Self {
             system,
@@ -152,7 +171,7 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
             segments,
             free,
             parameters,
-            origin: *start,
+            origin: start,
             normal,
             scales,
         })
@@ -163,15 +182,18 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
         self.system
     }
 
-    /// The same equations with another number of unknown parameters.
-    pub fn with_free(&self, free: usize, spans: Parameters<f64>) -> Self {
-        let states = self.scales.iter().copied().take(self.segments * N + 1);
-        let scales: Vec<f64> = states.chain(spans[..free].iter().copied()).collect();
-        Self {
-            free,
-            scales: DVector::from_vec(scales),
-            ..self.clone()
-        }
+    /// The equations near another orbit, with as many unknown parameters as there are `spans`.
+    ///
+    /// # Errors
+    /// If the orbit rests.
+    pub fn at_orbit(&self, orbit: &Orbit<S::Mode, N>, spans: &[f64]) -> Result<Self, Failure> {
+        Self::new(
+            self.system,
+            &orbit.guess(),
+            spans,
+            self.segments,
+            self.tolerance,
+        )
     }
 
     /// The same equations to another tolerance.
@@ -187,13 +209,16 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
         self.tolerance
     }
 
-    /// The same equations with that phase plane.
-    fn with_phase(&self, origin: SVector<f64, N>, normal: SVector<f64, N>) -> Self {
-        Self {
-            origin,
-            normal,
-            ..self.clone()
+    /// Measures states by the extents of an orbit, and times by its period.
+    fn set_scales(&mut self, orbit: &Orbit<S::Mode, N>) {
+        let (low, high) = orbit.extent();
+        let extent = sizes(&(high - low));
+        for segment in 0..self.segments {
+            self.scales
+                .fixed_rows_mut::<N>(segment * N)
+                .copy_from(&extent);
         }
+        self.scales[self.segments * N] = orbit.period_s;
     }
 
     /// Unknowns for a guess: the states along one trajectory from `start`.
@@ -213,9 +238,26 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
             let part = integrate(self.system, parameters, &last, part_s, self.tolerance)?;
             states.push(*part.end());
         }
+        Ok(self.unknowns(&states, period_s, parameters))
+    }
+
+    /// The unknowns of these states at the starts of the segments.
+    pub fn unknowns(
+        &self,
+        states: &[SVector<f64, N>],
+        period_s: f64,
+        parameters: Parameters<f64>,
+    ) -> DVector<f64> {
         let states = states.iter().flat_map(|state| state.iter().copied());
         let others = std::iter::once(period_s).chain(parameters[..self.free].iter().copied());
-        Ok(DVector::from_vec(states.chain(others).collect()))
+        DVector::from_vec(states.chain(others).collect())
+    }
+
+    /// The unit vector along a displacement of the start.
+    pub fn state_axis(&self, displacement: &SVector<f64, N>) -> DVector<f64> {
+        let mut axis = DVector::zeros(self.scales.len());
+        axis.fixed_rows_mut::<N>(0).copy_from(displacement);
+        axis.component_div(&self.scales).normalize()
     }
 
     /// The unit vector of the first unknown parameter.
@@ -242,6 +284,18 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
         unknowns.fixed_rows::<N>(segment * N).into_owned()
     }
 
+    /// The covector whose product with a displacement in the scales is that along the flow.
+    fn weighed(&self, flow: &SVector<f64, N>) -> SVector<f64, N> {
+        let scale = self.scales.fixed_rows::<N>(0);
+        flow.component_div(&scale).normalize().component_div(&scale)
+    }
+
+    /// The same displacement of an orbit, with the shift along the flow that keeps it in the plane across.
+    fn across(&self, displacement: &SVector<f64, N>, flow: &SVector<f64, N>) -> SVector<f64, N> {
+        let normal = self.weighed(flow);
+        displacement - flow * (normal.dot(displacement) / normal.dot(flow))
+    }
+
     fn dual_parameters(&self, parameters: Parameters<f64>) -> Parameters<Dual<K>> {
         std::array::from_fn(|k| unit(parameters[k], N + k))
     }
@@ -262,6 +316,7 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
         arclength: f64,
     ) -> Result<(Self, DVector<f64>, DVector<f64>), Failure> {
         let vector = null_vector(&(orbit.monodromy + SMatrix::identity()));
+        let vector = self.across(&vector, &orbit.flow);
         let mut problem = self.clone();
         let period_index = self.segments * N;
         problem.scales[period_index] *= 2.0;
@@ -323,25 +378,21 @@ impl<S: System<N>, const N: usize, const K: usize> Problem for Shooting<'_, S, N
             segments.push(trajectory);
         }
         let start = self.state(unknowns, 0);
-        let scale = SVector::<f64, N>::from_fn(|i, _| self.scales[i]);
-        let normal = self
-            .normal
-            .component_div(&scale)
-            .normalize()
-            .component_div(&scale);
+        let normal = self.weighed(&self.normal);
         residual[count * N] = normal.dot(&(start - self.origin));
         for i in 0..N {
             jacobian[(count * N, i)] = normal[i];
         }
         let flow = equations.derivative(&start, equations.mode_at(&start));
-        let (multipliers, trivial_error) = multipliers(&monodromy, &flow);
+        let (across, trivial_error) = across_the_flow(&monodromy, &flow);
         let solution = Orbit {
             period_s,
             parameters,
             segments,
             monodromy,
             flow,
-            multipliers,
+            multipliers: by_magnitude(&across),
+            across,
             trivial_error,
         };
         Ok(Evaluation {
@@ -364,15 +415,15 @@ impl<S: System<N>, const N: usize, const K: usize> Problem for Shooting<'_, S, N
             ..
         } = point;
         let equations = self.system.equations(orbit.parameters);
-        let scale = self.scales.fixed_rows::<N>(0).into_owned();
+        let mut problem = self.clone();
+        problem.set_scales(orbit);
+        let scale = problem.scales.fixed_rows::<N>(0).into_owned();
+        let own = tangent.component_mul(&self.scales);
         if self.segments > 1 {
-            let start = self.state(unknowns, 0);
-            let normal = equations.derivative(&start, equations.mode_at(&start));
-            return Ok((
-                self.with_phase(start, normal),
-                unknowns.clone(),
-                tangent.clone(),
-            ));
+            problem.origin = self.state(unknowns, 0);
+            problem.normal = orbit.flow;
+            let turned = own.component_div(&problem.scales).normalize();
+            return Ok((problem, unknowns.clone(), turned));
         }
         let trajectory = &orbit.segments[0];
         let speed = |k: usize| {
@@ -394,22 +445,28 @@ impl<S: System<N>, const N: usize, const K: usize> Problem for Shooting<'_, S, N
             .system
             .equations(self.dual_parameters(orbit.parameters));
         let moved = differentiate(&dual, trajectory, best, seeds)?;
-        let own = tangent.component_mul(&self.scales);
-        let mut along = SVector::<f64, N>::from_fn(|i, _| {
+        let along = SVector::<f64, N>::from_fn(|i, _| {
             let by_state: f64 = (0..N).map(|k| moved[i].tangent[k] * own[k]).sum();
             let by_parameters: f64 = (0..self.free)
                 .map(|k| moved[i].tangent[N + k] * own[N + 1 + k])
                 .sum();
             by_state + by_parameters
         });
-        along -= normal * (normal.dot(&along) / normal.dot(&normal));
+        let along = problem.across(&along, &normal);
         let mut unknowns = unknowns.clone();
         unknowns.fixed_rows_mut::<N>(0).copy_from(&start);
         let mut turned = own;
         turned.fixed_rows_mut::<N>(0).copy_from(&along);
-        let turned = turned.component_div(&self.scales).normalize();
-        Ok((self.with_phase(start, normal), unknowns, turned))
+        let turned = turned.component_div(&problem.scales).normalize();
+        (problem.origin, problem.normal) = (start, normal);
+        Ok((problem, unknowns, turned))
     }
+}
+
+/// Extents, of which none is nearly zero.
+fn sizes<const N: usize>(extent: &SVector<f64, N>) -> SVector<f64, N> {
+    let least = extent.amax() * 1e-3;
+    extent.map(|extent| extent.max(least))
 }
 
 fn unit<const K: usize>(value: f64, place: usize) -> Dual<K> {
@@ -428,28 +485,29 @@ fn null_vector<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SVector<f64, N> {
     SVector::from_fn(|i, _| rows[(least, i)])
 }
 
-/// The multipliers across the flow, by descending magnitude, and the error of the one along it.
+/// The monodromy matrix across the flow, and the error of the multiplier along it.
 ///
-/// In a basis that begins with the flow the monodromy matrix has a first column of a one and zeros:
-/// the rest of it has the other multipliers.
-fn multipliers<const N: usize>(
+/// In a basis that begins with the flow the monodromy matrix has a first column of a one and zeros: the
+/// rest of it has the other multipliers.
+fn across_the_flow<const N: usize>(
     monodromy: &SMatrix<f64, N, N>,
     flow: &SVector<f64, N>,
-) -> (Vec<Complex<f64>>, f64) {
+) -> (DMatrix<f64>, f64) {
     let error = (monodromy * flow - flow).norm() / flow.norm();
-    let basis = DMatrix::from_fn(N, N + 1, |i, k| {
-        if k == 0 {
-            flow[i] / flow.norm()
-        } else {
-            f64::from(u8::from(i + 1 == k))
-        }
+    let basis = DMatrix::from_fn(N, N + 1, |i, k| match k {
+        0 => flow[i] / flow.norm(),
+        _ => f64::from(u8::from(i + 1 == k)),
     });
     // Gram and Schmidt by QR of the flow and the unit vectors.
     let basis = basis.qr().q();
     let matrix = DMatrix::from_fn(N, N, |i, k| monodromy[(i, k)]);
     let turned = basis.transpose() * matrix * &basis;
-    let across = turned.view((1, 1), (N - 1, N - 1)).into_owned();
-    let mut all: Vec<_> = across.complex_eigenvalues().iter().copied().collect();
+    (turned.view((1, 1), (N - 1, N - 1)).into_owned(), error)
+}
+
+/// Eigenvalues by descending magnitude.
+fn by_magnitude(matrix: &DMatrix<f64>) -> Vec<Complex<f64>> {
+    let mut all: Vec<_> = matrix.complex_eigenvalues().iter().copied().collect();
     all.sort_by(|a, b| b.norm().total_cmp(&a.norm()).then(b.im.total_cmp(&a.im)));
-    (all, error)
+    all
 }

@@ -1,25 +1,41 @@
 //! Guesses for periodic orbits: near returns of a trajectory.
 
 use crate::failure::Failure;
+use crate::orbit::Guess;
 use crate::system::{Equations, Parameters, System};
 use crate::trajectory::integrate;
 use nalgebra::SVector;
 
-/// A guess for a periodic orbit.
+/// A near return.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NearReturn<const N: usize> {
-    /// Where it starts.
-    pub start: SVector<f64, N>,
-    /// When it returns, s.
-    pub period_s: f64,
+    /// The orbit that it is near to.
+    pub guess: Guess<N>,
     /// Number of crossings of the section, one per cycle.
     pub cycles: usize,
     /// Distance between start and return, as a share of the trajectory's extent.
     pub distance: f64,
 }
 
-/// The nearest return after each number of cycles up to `most_cycles`, ascending: of the trajectory
-/// from `start` after `transient_s`, over `observed_s`. A cycle is from one rise of a component through
+/// A trajectory that is searched for returns.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search<const N: usize> {
+    /// Its start.
+    pub start: SVector<f64, N>,
+    /// Initial transient to discard, s. Its states are kept in memory, so that a long one is better left to
+    /// another integrator.
+    pub transient_s: f64,
+    /// Length that is searched, s.
+    pub observed_s: f64,
+    /// The component that rises once per cycle.
+    pub component: usize,
+    /// Most cycles of an orbit.
+    pub most_cycles: usize,
+    /// Integration tolerance.
+    pub tolerance: f64,
+}
+
+/// The nearest return after each number of cycles, ascending. A cycle is from one rise of a component through
 /// the middle of its range to the next.
 ///
 /// # Errors
@@ -27,14 +43,22 @@ pub struct NearReturn<const N: usize> {
 pub fn near_returns<S: System<N>, const N: usize>(
     system: &S,
     parameters: Parameters<f64>,
-    start: &SVector<f64, N>,
-    component: usize,
-    transient_s: f64,
-    observed_s: f64,
-    most_cycles: usize,
-    tolerance: f64,
+    search: &Search<N>,
 ) -> Result<Vec<NearReturn<N>>, Failure> {
-    let settled = integrate(system, parameters, start, transient_s, tolerance)?;
+    let Search {
+        component,
+        observed_s,
+        most_cycles,
+        tolerance,
+        ..
+    } = *search;
+    let settled = integrate(
+        system,
+        parameters,
+        &search.start,
+        search.transient_s,
+        tolerance,
+    )?;
     let observed = integrate(system, parameters, settled.end(), observed_s, tolerance)?;
     let (low, high) = observed.extent();
     let extent = high - low;
@@ -78,8 +102,11 @@ pub fn near_returns<S: System<N>, const N: usize>(
     for cycles in 1..=most_cycles.min(crossings.len().saturating_sub(1)) {
         let pairs = crossings.iter().zip(&crossings[cycles..]);
         let returns = pairs.map(|(from, to)| NearReturn {
-            start: from.1,
-            period_s: to.0 - from.0,
+            guess: Guess {
+                start: from.1,
+                period_s: to.0 - from.0,
+                parameters,
+            },
             cycles,
             distance: (to.1 - from.1).component_div(&size).amax(),
         });

@@ -1,7 +1,7 @@
 //! Functions of an orbit that are zero at its bifurcations.
 
 use crate::orbit::Orbit;
-use nalgebra::Complex;
+use nalgebra::DMatrix;
 
 /// A bifurcation of a periodic orbit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -40,21 +40,70 @@ impl Bifurcation {
         }
     }
 
-    /// The function that is zero at the bifurcation; NaN where none is.
+    /// The function that is zero at the bifurcation, a determinant; NaN where none is.
     pub fn test<M, const N: usize>(self, orbit: &Orbit<M, N>) -> f64 {
-        let multipliers = &orbit.multipliers;
-        let one = Complex::new(1.0, 0.0);
-        let product: Complex<f64> = match self {
-            Self::Fold | Self::BranchPoint => multipliers.iter().map(|m| m - one).product(),
-            Self::PeriodDoubling => multipliers.iter().map(|m| m + one).product(),
+        let across = &orbit.across;
+        let identity = |size| DMatrix::<f64>::identity(size, size);
+        match self {
+            Self::Fold | Self::BranchPoint => (across - identity(N - 1)).determinant(),
+            Self::PeriodDoubling => (across + identity(N - 1)).determinant(),
             Self::NeimarkSacker => {
-                let pairs = (0..multipliers.len()).flat_map(|i| (0..i).map(move |k| (i, k)));
-                pairs
-                    .map(|(i, k)| multipliers[i] * multipliers[k] - one)
-                    .product()
+                let products = products_of_pairs(across);
+                let size = products.nrows();
+                (products - identity(size)).determinant()
             }
-            Self::Grazing => return f64::NAN,
-        };
-        product.re
+            Self::Grazing => f64::NAN,
+        }
+    }
+}
+
+/// The pairs of indices below `size`, ascending.
+fn pairs(size: usize) -> Vec<(usize, usize)> {
+    (0..size)
+        .flat_map(|high| (0..high).map(move |low| (low, high)))
+        .collect()
+}
+
+/// The matrix of 2 x 2 minors, whose eigenvalues are the products of pairs of eigenvalues.
+fn products_of_pairs(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let pairs = pairs(a.nrows());
+    DMatrix::from_fn(pairs.len(), pairs.len(), |row, column| {
+        let ((p, q), (r, s)) = (pairs[row], pairs[column]);
+        a[(p, r)] * a[(q, s)] - a[(p, s)] * a[(q, r)]
+    })
+}
+
+/// The matrix whose eigenvalues are the sums of pairs of eigenvalues: the derivative of the minors of
+/// 1 + t A at t = 0.
+pub(crate) fn sums_of_pairs(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let pairs = pairs(a.nrows());
+    let one = |i: usize, k: usize| f64::from(u8::from(i == k));
+    DMatrix::from_fn(pairs.len(), pairs.len(), |row, column| {
+        let ((p, q), (r, s)) = (pairs[row], pairs[column]);
+        let direct = one(p, r) * a[(q, s)] + a[(p, r)] * one(q, s);
+        direct - one(p, s) * a[(q, r)] - a[(p, s)] * one(q, r)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eigenvalues_of_pairs_are_products_and_sums() {
+        // Eigenvalues 2, 3 and 5 in another basis.
+        let diagonal = DMatrix::from_diagonal(&nalgebra::DVector::from_vec(vec![2.0, 3.0, 5.0]));
+        let basis = DMatrix::from_row_slice(3, 3, &[1.0, 0.5, -0.2, 0.3, 1.0, 0.4, -0.1, 0.2, 1.0]);
+        let inverse = basis.clone().try_inverse().unwrap();
+        let a = &basis * diagonal * inverse;
+        for (matrix, wanted) in [
+            (products_of_pairs(&a), [6.0, 10.0, 15.0]),
+            (sums_of_pairs(&a), [5.0, 7.0, 8.0]),
+        ] {
+            for value in wanted {
+                let shifted = &matrix - DMatrix::<f64>::identity(3, 3) * value;
+                assert!(shifted.determinant().abs() < 1e-11, "{value}");
+            }
+        }
     }
 }

@@ -20,8 +20,9 @@ const COLUMNS: usize = 6;
 const GREATEST_GROWTH: f64 = 4.0;
 /// Share of the optimal step that is taken.
 const SAFETY: f64 = 0.85;
-/// Steps that a trajectory may take.
-const MOST_STEPS: usize = 100_000;
+/// Steps that a trajectory may take: at once, and per second. The paper's take some fifty per second.
+const STEPS_AT_ONCE: f64 = 1e5;
+const STEPS_PER_S: f64 = 1e4;
 /// Size of a state, in multiples of its size so far, beyond which it diverges.
 const DIVERGED: f64 = 1e6;
 /// Trial steps for the end of a mode; bisection alone needs 60.
@@ -180,7 +181,7 @@ impl<S: System<N>, const N: usize> Integrator<'_, S, N> {
             }
             sizes = sizes.sup(&x.abs());
             let steps = trajectory.legs.len();
-            if steps >= MOST_STEPS {
+            if steps as f64 > STEPS_AT_ONCE + STEPS_PER_S * time_s {
                 return Err(Failure::TooManySteps { time_s, steps });
             }
         }

@@ -49,11 +49,6 @@ impl Vehicle {
         Ok(Self { scenario, keys })
     }
 
-    /// The scenario at these parameters.
-    pub fn at(&self, parameters: Parameters<f64>) -> Scenario<f64> {
-        self.scenario_at(parameters)
-    }
-
     /// The parameters' values in the scenario.
     pub fn parameters(&self) -> Parameters<f64> {
         let mut scenario = self.scenario;
@@ -61,9 +56,20 @@ impl Vehicle {
         self.keys.each_ref().map(value)
     }
 
-    /// Names of the parameters.
-    pub fn keys(&self) -> &[String; 2] {
-        &self.keys
+    /// The mode of friction in which an equilibrium at `x` slips: without torque where the steering can
+    /// stick, else that of its angle.
+    pub fn mode_of_slipping(&self, x: &Vector4<f64>) -> FrictionMode {
+        let equations = self.equations(self.parameters());
+        match equations.model.can_stick(equations.injection) {
+            true => FrictionMode::Neutral,
+            false => equations.mode_at(x),
+        }
+    }
+
+    /// Whether the steering can stick.
+    pub fn can_stick(&self) -> bool {
+        let equations = self.equations(self.parameters());
+        equations.model.can_stick(equations.injection)
     }
 
     fn scenario_at<T: Real>(&self, parameters: Parameters<T>) -> Scenario<T> {

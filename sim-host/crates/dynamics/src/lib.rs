@@ -3,6 +3,7 @@
 pub mod attractor;
 pub mod averaging;
 pub mod basin;
+pub mod bifurcations;
 pub mod characteristics;
 pub mod component;
 pub mod config;

@@ -1,0 +1,216 @@
+//! Bifurcations by continuation, beside what trajectories and equilibria show.
+
+use dynamics::bifurcations::{Bifurcations, BifurcationsError, Plan, bifurcations};
+use dynamics::component::Component;
+use dynamics::poincare::crossings;
+use dynamics::section::{Direction, Section};
+use dynamics::simulate::started_at;
+use dynamics::sweep::{RunControl, Values};
+use dynamics::{equilibria, sweep::mirrored};
+use nalgebra::Vector4;
+use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use shared_model::vehicle::Model;
+
+fn plan(coefficient: f64, rpm: f64, range: (f64, f64)) -> Plan {
+    let mut scenario = Scenario::reconstruction();
+    scenario.friction.coefficient = coefficient;
+    scenario.run.wheel_speed_rpm = rpm;
+    Plan {
+        scenario,
+        parameter: "run.wheel_speed_rpm".into(),
+        range,
+        second: None,
+        cycles: None,
+        transient_s: 100.0,
+        doublings: 0,
+        tolerance: 1e-12,
+    }
+}
+
+fn only_doubling(found: &Bifurcations) -> f64 {
+    let [special] = &found.specials[..] else {
+        panic!("{:?}", found.specials);
+    };
+    assert_eq!(special.kind, "period doubling");
+    special.parameter
+}
+
+/// Growth per period of a perturbation, by the engine's trajectory: distances of crossings from the next
+/// but one but one, which alternate in sign.
+fn growth(scenario: &Scenario<f64>, state: [f64; 4], period_s: f64) -> f64 {
+    const PERIODS: usize = 300;
+    let model = Model::new(scenario);
+    let mut start = model.state(Vector4::from(state));
+    start.x[0] += 1e-5;
+    let mut scenario = started_at(scenario, &start);
+    scenario.run.duration_s = period_s * (PERIODS + 3) as f64;
+    let section = Section {
+        component: Component::YAW_RATE,
+        value: 0.0,
+        direction: Direction::Rising,
+    };
+    let all = crossings(&scenario, 5.0 * period_s, &section).unwrap();
+    let apart = |k: usize| (all[k + 1].x - all[k].x).norm();
+    let last = all.len() - 2;
+    (apart(last) / apart(0)).powf(1.0 / last as f64)
+}
+
+/// A tenth of a revolution per minute below the doubling a perturbation decays, as far above it grows, at
+/// the rate of the multiplier.
+#[test]
+fn trajectories_on_both_sides_of_a_doubling_grow_as_the_multiplier() {
+    for (coefficient, rpm) in [(0.0, 1700.0), (0.28, 1620.0)] {
+        let found = bifurcations(&plan(coefficient, rpm, (rpm, rpm + 60.0))).unwrap();
+        let doubling = only_doubling(&found);
+        for side in [-0.1, 0.1] {
+            let at = bifurcations(&plan(
+                coefficient,
+                doubling - 10.0,
+                (doubling - 20.0, doubling + side),
+            ));
+            let at = at.unwrap();
+            let orbit = at.orbits[0].points.last().unwrap();
+            assert!((orbit.parameter - doubling - side).abs() < 1e-9);
+            let mut scenario = plan(coefficient, orbit.parameter, (0.0, 0.0)).scenario;
+            scenario.run.duration_s = 1.0;
+            let multiplier = orbit.multipliers[0];
+            let measured = growth(&scenario, orbit.state, orbit.period_s);
+            let wanted = multiplier.re.hypot(multiplier.im);
+            assert!((wanted > 1.0) == (side > 0.0), "{wanted}");
+            assert!(
+                (measured - wanted).abs() < 2e-5,
+                "{coefficient} {side}: {measured} {wanted}"
+            );
+        }
+    }
+}
+
+/// The same bifurcation by the eigenvalues of a sweep.
+#[test]
+fn the_hopf_bifurcation_is_that_of_a_sweep() {
+    let plan = plan(0.28, 1600.0, (1600.0, 1700.0));
+    let found = bifurcations(&plan).unwrap();
+    let [hopf] = &found.hopf[..] else {
+        panic!("{:?}", found.hopf)
+    };
+    let speeds = Values::new("wheel speed (rpm)", 1600.0, 1700.0, 50.0).unwrap();
+    let over = equilibria::over_speed(&plan.scenario, &speeds, RunControl::none()).unwrap();
+    let swept = equilibria::hopf(&plan.scenario, &over).unwrap();
+    let [swept] = &swept[..] else {
+        panic!("{swept:?}")
+    };
+    let range = swept.lower_rpm - 1e-6..=swept.upper_rpm + 1e-6;
+    assert!(
+        range.contains(&hopf.parameter),
+        "{} {range:?}",
+        hopf.parameter
+    );
+    assert!((hopf.frequency_rad_per_s - swept.frequency_rad_per_s).abs() < 1e-4);
+    // Subcritical: the orbit that is born below it is unstable.
+    assert!(hopf.first_lyapunov_coefficient > 0.0);
+}
+
+/// Without friction the branch that is born there exists below, and is unstable.
+#[test]
+fn the_orbit_of_the_hopf_bifurcation_is_below_it() {
+    let found = bifurcations(&plan(0.0, 1640.0, (1640.0, 1660.0))).unwrap();
+    let hopf = &found.hopf[0];
+    let born = found
+        .orbits
+        .iter()
+        .find(|branch| branch.origin.contains("Hopf"))
+        .unwrap();
+    assert!(
+        born.points
+            .iter()
+            .all(|orbit| !orbit.stable && orbit.parameter < hopf.parameter)
+    );
+    let first = &born.points[0];
+    let period_s = std::f64::consts::TAU / hopf.frequency_rad_per_s;
+    assert!((first.period_s / period_s - 1.0).abs() < 1e-3);
+}
+
+/// The curve of the doubling in speed and amplitude passes through the doubling over the speed alone.
+#[test]
+fn the_curve_of_a_doubling_meets_the_branches_at_its_points() {
+    let mut plan = plan(0.28, 1620.0, (1600.0, 1900.0));
+    plan.scenario.dither.waveform = Waveform::Square;
+    plan.second = Some(("dither.amplitude_v".into(), (0.0, 0.1)));
+    let found = bifurcations(&plan).unwrap();
+    let curve = found
+        .curves
+        .iter()
+        .find(|curve| curve.kind == "period doubling")
+        .unwrap();
+    assert!(curve.points.len() > 5);
+    let point = curve.points[curve.points.len() / 2];
+    plan.second = None;
+    plan.scenario.dither.amplitude_v = point.parameters[1];
+    plan.scenario.run.wheel_speed_rpm = point.parameters[0] - 20.0;
+    plan.range = (point.parameters[0] - 30.0, point.parameters[0] + 30.0);
+    let doubling = only_doubling(&bifurcations(&plan).unwrap());
+    assert!(
+        (doubling - point.parameters[0]).abs() < 1e-4,
+        "{doubling} {point:?}"
+    );
+}
+
+#[test]
+fn the_other_lobe_has_the_mirrored_branch_where_the_motor_does_nothing() {
+    let mut given = plan(0.28, 1600.0, (1590.0, 1610.0));
+    given.scenario.steering.motor_current_a = 0.0;
+    let mut other = given.clone();
+    other.scenario = mirrored(&given.scenario);
+    let [given, other] = [given, other].map(|plan| bifurcations(&plan).unwrap());
+    let period_s =
+        |found: &Bifurcations| found.orbits.first().map(|branch| branch.points[0].period_s);
+    match (period_s(&given), period_s(&other)) {
+        (Some(given), Some(other)) => assert!((given - other).abs() < 1e-8),
+        (given, other) => assert_eq!(given, other),
+    }
+}
+
+#[test]
+fn a_plan_that_is_none_is_refused_with_its_bounds() {
+    let good = plan(0.28, 1600.0, (1500.0, 1700.0));
+    let refused = |change: &dyn Fn(&mut Plan)| {
+        let mut plan = good.clone();
+        change(&mut plan);
+        bifurcations(&plan)
+            .err()
+            .map(|error| error.to_string())
+            .unwrap_or_default()
+    };
+    assert!(refused(&|plan| plan.range = (1700.0, 1500.0)).contains("ascending range"));
+    assert!(refused(&|plan| plan.range = (1600.0, 1600.0)).contains("ascending range"));
+    assert!(refused(&|plan| plan.range = (0.0, 1700.0)).contains("within 1 to 100000"));
+    assert!(refused(&|plan| plan.range = (f64::NAN, 1700.0)).contains("ascending range"));
+    assert!(refused(&|plan| plan.range = (1650.0, 1700.0)).contains("1600: must be in the range"));
+    assert!(
+        refused(&|plan| plan.parameter = "run.speed".into()).contains("no number of that name")
+    );
+    assert!(refused(&|plan| plan.tolerance = 1e-17).contains("rounding"));
+    assert!(refused(&|plan| plan.tolerance = f64::NAN).contains("from 1e-14"));
+    let same = Some(("run.wheel_speed_rpm".into(), (1500.0, 1700.0)));
+    let mut twice = good.clone();
+    twice.second = same;
+    assert!(matches!(
+        bifurcations(&twice),
+        Err(BifurcationsError::SameParameter { .. })
+    ));
+}
+
+/// At rest there is no orbit, and the reason is kept.
+#[test]
+fn a_trajectory_that_comes_to_rest_has_no_branch() {
+    let mut plan = plan(0.28, 400.0, (300.0, 500.0));
+    plan.transient_s = 300.0;
+    let found = bifurcations(&plan).unwrap();
+    assert!(found.orbits.is_empty() && !found.equilibria.is_empty());
+    assert!(
+        found.without_branch[0].contains("equilibrium"),
+        "{:?}",
+        found.without_branch
+    );
+}
