@@ -146,7 +146,7 @@ impl Row {
             period_s: orbit.period_s,
             cycles: orbit.cycles,
             maxima: orbit.maxima_rad_per_s.len(),
-            prominent_maxima: orbit.prominent_maxima,
+            prominent_maxima: orbit.prominent_maxima_rad_per_s.len(),
             stable: orbit.stable,
             exponent_per_s: orbit.exponent_per_s,
             multiplier_1_re: first.0,

@@ -17,7 +17,10 @@ use shared_model::Scenario;
 /// Classify regimes (equilibrium, period-n, chaos) over wheel speed or dither amplitude, and bisect
 /// the edges between them.
 ///
-/// The period is that of the yaw rate's maxima. Chaos requires a largest Lyapunov exponent that
+/// The period is that of the yaw rate's maxima that stand out by 1 % of its range, as the paper counts; the
+/// CSV has the number of cycles too, which is what bifurcates. A trajectory that has not settled is decided
+/// by Newton's method: by the stable orbit or equilibrium that it approaches. Where an orbit ends at an
+/// edge or loses its stability, continuation locates the bifurcation. Chaos requires a largest Lyapunov exponent that
 /// exceeds three standard errors and the resolution of the run. If the two criteria disagree, the
 /// regime is undecided. Chaos whose maxima visit n separate bands in turn is distinguished from
 /// one-band chaos. The sweep is run from the scenario's initial state and from the mirrored one, on
@@ -76,6 +79,7 @@ struct Row<'a> {
     steering_angle_lobe: &'a str,
     period_residual: Option<f64>,
     cycle_s: Option<f64>,
+    cycles: Option<usize>,
     exponent_per_s: Option<f64>,
     exponent_threshold_per_s: Option<f64>,
     yaw_rate_min_rad_per_s: Option<f64>,
@@ -148,6 +152,7 @@ fn row<'a>(
         steering_angle_lobe: if stays { attractor.lobe() } else { "" },
         period_residual: attractor.residual,
         cycle_s: attractor.cycle_s,
+        cycles: attractor.cycles,
         exponent_per_s: attractor.exponent_per_s,
         exponent_threshold_per_s: attractor.exponent_threshold_per_s,
         yaw_rate_min_rad_per_s: stays.then_some(low),
@@ -174,8 +179,16 @@ fn show(results: &Results) {
             );
         }
         for edge in &sweep.found.edges {
+            let what = match (edge.bifurcation, edge.is_inflection) {
+                (Some(at), _) => format!(
+                    "; {} at {:.6} +- {:.0e} {unit}",
+                    at.kind, at.value, at.error
+                ),
+                (None, true) => "; an inflection of the same orbit, no bifurcation".into(),
+                (None, false) => String::new(),
+            };
             say!(
-                "  edge from {:.4} to {:.4} {unit}: {} below, {} above",
+                "  edge from {:.4} to {:.4} {unit}: {} below, {} above{what}",
                 edge.lower,
                 edge.upper,
                 edge.below,

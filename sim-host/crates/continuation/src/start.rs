@@ -3,8 +3,13 @@
 use crate::failure::Failure;
 use crate::orbit::Guess;
 use crate::system::{Equations, Parameters, System};
-use crate::trajectory::integrate;
+use crate::trajectory::{Trajectory, integrate};
 use nalgebra::SVector;
+
+/// Extent, as a share of its size, of a trajectory at rest.
+const AT_REST: f64 = 1e-4;
+/// Corrections for a crossing; each squares the error.
+const MOST_CORRECTIONS: usize = 4;
 
 /// A near return.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,40 +67,12 @@ pub fn near_returns<S: System<N>, const N: usize>(
     let observed = integrate(system, parameters, settled.end(), observed_s, tolerance)?;
     let (low, high) = observed.extent();
     let extent = high - low;
-    if extent
-        .component_div(&low.abs().sup(&high.abs()).add_scalar(f64::MIN_POSITIVE))
-        .amax()
-        < 1e-4
-    {
+    let size = low.abs().sup(&high.abs()).add_scalar(f64::MIN_POSITIVE);
+    if extent.component_div(&size).amax() < AT_REST {
         return Err(Failure::AtRest);
     }
     let level = 0.5 * (low[component] + high[component]);
-    let times_s = observed.times_s();
-    let equations = system.equations(parameters);
-    let crossings: Vec<(f64, SVector<f64, N>)> = (0..observed.legs.len())
-        .filter_map(|k| {
-            let [before, after] = [observed.states[k], observed.states[k + 1]];
-            let rises = before[component] < level && after[component] >= level;
-            let mode = observed.legs[k].mode;
-            if !rises || equations.is_confined(mode) {
-                return None;
-            }
-            // The rest is Newton's method's: to the level by a few steps along the flow.
-            let (mut time_s, mut x) = (0.0, before);
-            for _ in 0..4 {
-                let rates = equations.derivative(&x, mode);
-                let next_s = time_s + (level - x[component]) / rates[component];
-                if !(0.0..=observed.legs[k].step_s).contains(&next_s) {
-                    break;
-                }
-                x = *integrate(system, parameters, &before, next_s, tolerance)
-                    .ok()?
-                    .end();
-                time_s = next_s;
-            }
-            Some((times_s[k] + time_s, x))
-        })
-        .collect();
+    let crossings = rises(system, parameters, &observed, component, level, tolerance);
     let least = 1e-3 * extent.amax();
     let size = extent.map(|extent| extent.max(least));
     let mut found = Vec::new();
@@ -118,4 +95,39 @@ pub fn near_returns<S: System<N>, const N: usize>(
         });
     }
     Ok(found)
+}
+
+/// Where a trajectory's component rises through a level, unless its mode confines it there: time, s, and
+/// state.
+pub fn rises<S: System<N>, const N: usize>(
+    system: &S,
+    parameters: Parameters<f64>,
+    trajectory: &Trajectory<S::Mode, N>,
+    component: usize,
+    level: f64,
+    tolerance: f64,
+) -> Vec<(f64, SVector<f64, N>)> {
+    let equations = system.equations(parameters);
+    let times_s = trajectory.times_s();
+    let rise = |k: usize| {
+        let [before, after] = [trajectory.states[k], trajectory.states[k + 1]];
+        let leg = &trajectory.legs[k];
+        let rises = before[component] < level && after[component] >= level;
+        if !rises || equations.is_confined(leg.mode) {
+            return None;
+        }
+        // By Newton's method from the start of the step.
+        let (mut time_s, mut x) = (0.0, before);
+        for _ in 0..MOST_CORRECTIONS {
+            let rates = equations.derivative(&x, leg.mode);
+            let next_s = time_s + (level - x[component]) / rates[component];
+            if !(0.0..=leg.step_s).contains(&next_s) {
+                break;
+            }
+            let there = integrate(system, parameters, &before, next_s, tolerance).ok()?;
+            (time_s, x) = (next_s, *there.end());
+        }
+        Some((times_s[k] + time_s, x))
+    };
+    (0..trajectory.legs.len()).filter_map(rise).collect()
 }

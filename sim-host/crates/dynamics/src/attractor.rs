@@ -4,6 +4,7 @@ use crate::equilibria::Equilibrium;
 use crate::lyapunov::{Exponent, largest_of};
 use crate::observe::observe;
 use crate::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
+use crate::settled::{Settled, settled};
 use crate::sweep::{RunControl, Timing};
 use engine::taylor::{Observables, Trajectory};
 use engine::{EarlyEnd, Reason};
@@ -15,6 +16,9 @@ use shared_model::{InvalidScenario, Scenario};
 const COMMON_PERIODIC: f64 = 0.97;
 /// The same for chaotic motions, whose extents are those of a finite time.
 const COMMON_CHAOTIC: f64 = 0.8;
+/// Difference of maxima one cycle apart, as a share of the yaw rate's range, beyond which a trajectory has
+/// not settled.
+const UNSETTLED: f64 = 1e-6;
 /// Most bands that are counted.
 const MAX_BANDS: usize = 6;
 /// Fewest maxima that tell a band's extent.
@@ -77,8 +81,11 @@ pub struct Attractor {
     /// Greatest difference of maxima one cycle apart, over the yaw rate's range: the period's
     /// uncertainty. Of a motion without a period, the least over the periods tried.
     pub residual: Option<f64>,
-    /// Time of a cycle, s.
+    /// Time after which the maxima repeat, s.
     pub cycle_s: Option<f64>,
+    /// Cycles in that time, by rises of the yaw rate through the middle of its range: the period on a
+    /// Poincaré section, which is what bifurcates. The maxima change their number without it.
+    pub cycles: Option<usize>,
     /// Largest Lyapunov exponent, 1/s, where it was asked for and the run is long enough.
     pub exponent_per_s: Option<f64>,
     /// What the exponent must exceed to count as positive, 1/s.
@@ -111,6 +118,7 @@ impl Attractor {
             kind,
             residual: None,
             cycle_s: None,
+            cycles: None,
             exponent_per_s: None,
             exponent_threshold_per_s: None,
             maxima_rad_per_s: Vec::new(),
@@ -145,6 +153,7 @@ impl Attractor {
             kind: kind(period, exponent, K > 0, &maxima),
             residual,
             cycle_s,
+            cycles: cycle_s.and_then(|cycle_s| cycles(&found.turns[YAW_RATE], cycle_s)),
             exponent_per_s: exponent.map(|e| e.per_s),
             exponent_threshold_per_s: exponent.map(|e| e.threshold_per_s()),
             maxima_rad_per_s: heights,
@@ -153,6 +162,46 @@ impl Attractor {
             end: found.end.x.into(),
             diverges_at_s: None,
         }
+    }
+
+    /// The same, or what Newton's method finds beside a trajectory that has not settled.
+    fn decided(mut self, scenario: &Scenario<f64>) -> Self {
+        let is_doubtful = match self.kind {
+            Kind::Undecided => true,
+            Kind::Periodic(_) => self.residual.is_some_and(|residual| residual > UNSETTLED),
+            _ => false,
+        };
+        if !is_doubtful {
+            return self;
+        }
+        match settled(scenario, &self.end) {
+            Some(Settled::Orbit(orbit)) => {
+                self.kind = Kind::Periodic(orbit.prominent_maxima_rad_per_s.len());
+                self.residual = Some(0.0);
+                self.cycle_s = Some(orbit.period_s);
+                self.cycles = Some(orbit.cycles);
+                self.maxima_rad_per_s = orbit.prominent_maxima_rad_per_s;
+                self.end = orbit.state;
+            }
+            Some(Settled::Equilibrium(state)) => {
+                self = Self {
+                    kind: Kind::Equilibrium,
+                    residual: None,
+                    cycle_s: None,
+                    cycles: None,
+                    exponent_per_s: None,
+                    exponent_threshold_per_s: None,
+                    maxima_rad_per_s: Vec::new(),
+                    lower: state,
+                    upper: state,
+                    end: state,
+                    diverges_at_s: None,
+                };
+            }
+            // It alternates, but leaves the orbit beside it.
+            None => self.kind = Kind::Undecided,
+        }
+        self
     }
 
     /// The side of the steering angle on which it lies.
@@ -200,7 +249,8 @@ impl Attractor {
 ///
 /// The period is that of the yaw rate's maxima over the time observed, to 0.2 % of its range. If
 /// `with_exponent`, the largest Lyapunov exponent has to agree, positive only where there is no
-/// period; else a motion without period stays undecided, and one with period is taken as such.
+/// period, and a trajectory that has not settled is decided by the orbit or equilibrium beside it; else a
+/// motion without period stays undecided, and one with period is taken as such.
 ///
 /// # Errors
 /// If a scenario is not valid.
@@ -215,7 +265,8 @@ pub fn attractors(
         section: None,
     };
     if with_exponent {
-        let see = |_: &_, found: &Trajectory<1>| Attractor::of(found, timing);
+        let see =
+            |scenario: &_, found: &Trajectory<1>| Attractor::of(found, timing).decided(scenario);
         observe(scenarios, timing, observables, control, see)
     } else {
         let see = |_: &_, found: &Trajectory<0>| Attractor::of(found, timing);
@@ -246,6 +297,19 @@ pub fn attractor(
     let one = std::slice::from_ref(scenario);
     let mut found = attractors(one, timing, with_exponent, RunControl::none())?;
     Ok(found.pop().flatten().expect("nobody stops it"))
+}
+
+/// Cycles in the time after which maxima repeat, by a quantity's turning points (time in s, value).
+fn cycles(turns: &[(f64, f64)], cycle_s: f64) -> Option<usize> {
+    let heights = || turns.iter().map(|turn| turn.1);
+    let low = heights().fold(f64::INFINITY, f64::min);
+    let high = heights().fold(f64::NEG_INFINITY, f64::max);
+    let middle = 0.5 * (low + high);
+    let rises = turns
+        .windows(2)
+        .filter(|pair| pair[0].1 < middle && pair[1].1 >= middle);
+    let time_s = turns.last()?.0 - turns.first()?.0;
+    Some((rises.count() as f64 * cycle_s / time_s).round() as usize)
 }
 
 /// Maxima and exponent must agree.

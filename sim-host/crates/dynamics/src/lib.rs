@@ -26,6 +26,7 @@ pub mod realisability;
 pub mod regions;
 pub mod schedule;
 pub mod section;
+mod settled;
 pub mod simulate;
 pub mod sweep;
 pub mod synchronisation;

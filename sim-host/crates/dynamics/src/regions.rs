@@ -2,9 +2,19 @@
 
 use crate::attractor::{Attractor, Kind, attractors};
 use crate::equilibria;
+use crate::settled::end_of_orbit;
+use crate::simulate::started_at;
 use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::Scenario;
+use shared_model::vehicle::Model;
+
+/// Further transients of a trajectory that is undecided, in lengths of a run.
+const LONGER: [f64; 2] = [10.0, 40.0];
+/// The longest of them, s.
+const LONGEST_S: f64 = 20_000.0;
+/// How far beyond an edge its bifurcation is searched for, in widths of its interval.
+const BEYOND: f64 = 20.0;
 
 /// The motion at one value of the parameter.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -13,6 +23,17 @@ pub struct Sample {
     pub value: f64,
     /// What the motion ends on.
     pub attractor: Attractor,
+}
+
+/// A bifurcation at an edge, by continuation of the orbit on one side.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct EdgeBifurcation {
+    /// Its kind.
+    pub kind: &'static str,
+    /// The parameter's value.
+    pub value: f64,
+    /// Its error.
+    pub error: f64,
 }
 
 /// A change of kind, located to an interval.
@@ -26,9 +47,25 @@ pub struct Edge {
     pub below: Kind,
     /// Kind at the upper end.
     pub above: Kind,
+    /// The bifurcation at which the orbit of one side ends or loses its stability. It may be outside the
+    /// interval: where attractors coexist, the trajectory may leave an orbit before that.
+    pub bifurcation: Option<EdgeBifurcation>,
+    /// Orbits of as many cycles on both sides: one of them has another maximum, an inflection of the same
+    /// orbit, which is no bifurcation.
+    pub is_inflection: bool,
 }
 
 impl Edge {
+    /// Where it is: at the bifurcation if that is in the interval, else in the middle.
+    pub fn value(&self) -> f64 {
+        let width = self.upper - self.lower;
+        let interval = self.lower - width..=self.upper + width;
+        let exact = self.bifurcation.map(|bifurcation| bifurcation.value);
+        exact
+            .filter(|value| interval.contains(value))
+            .unwrap_or(self.middle())
+    }
+
     /// Chaos in one band begins or ends here: some above and none below, or the other way round.
     pub fn is_of_chaos(&self, begins: bool) -> bool {
         let (from, to) = if begins {
@@ -75,7 +112,8 @@ pub struct Regions {
 }
 
 /// Classifies the motion from the scenario's start at each of the values, and bisects between
-/// neighbours of unlike kind until the edge is in an interval no wider than `width`.
+/// neighbours of unlike kind until the edge is in an interval no wider than `width`. Where an orbit ends or
+/// loses its stability there, continuation locates the bifurcation.
 ///
 /// All edges are halved side by side. Where the kind in the middle is neither of the two, both
 /// halves have an edge, so cascades unfold. Windows narrower than the step of the sweep between
@@ -108,8 +146,9 @@ pub fn regions(
     let mut samples: Vec<Sample> = Vec::new();
     let mut complete = true;
     while complete && !level.is_empty() {
-        let found = attractors(&level, timing, true, control)?;
+        let mut found = attractors(&level, timing, true, control)?;
         complete = found.iter().all(Option::is_some);
+        prolong(&level, &mut found, timing, control)?;
         let sampled = level.iter().zip(found).filter_map(|(scenario, attractor)| {
             let value = parameter.of(scenario);
             attractor.map(|attractor| Sample { value, attractor })
@@ -123,13 +162,49 @@ pub fn regions(
             .map(|edge| parameter.set(scenario, edge.middle()))
             .collect();
     }
-    let edges = edges(&samples);
+    let mut edges = edges(&samples);
+    if complete {
+        for edge in &mut edges {
+            edge.bifurcation = bifurcation_at(scenario, parameter, &samples, edge);
+        }
+    }
     Ok(Regions {
         regions: stretches(&samples, &edges),
         samples,
         edges,
         complete,
     })
+}
+
+/// Continues the trajectories that are undecided for longer: near a bifurcation they leave an orbit as
+/// slowly as they would approach it.
+fn prolong(
+    scenarios: &[Scenario<f64>],
+    found: &mut [Option<Attractor>],
+    timing: Timing,
+    control: RunControl,
+) -> Result<(), SweepError> {
+    for factor in LONGER {
+        let undecided: Vec<(usize, Scenario<f64>)> = (0..found.len())
+            .filter_map(|k| {
+                let attractor = found[k].as_ref()?;
+                let state = Model::new(&scenarios[k]).state(attractor.end.into());
+                let continued = started_at(&scenarios[k], &state);
+                (attractor.kind == Kind::Undecided).then_some((k, continued))
+            })
+            .collect();
+        let continued: Vec<Scenario<f64>> =
+            undecided.iter().map(|(_, scenario)| *scenario).collect();
+        let longer = Timing {
+            transient_s: (factor * timing.time_s()).min(LONGEST_S),
+            ..timing
+        };
+        let again = attractors(&continued, longer, true, control)?;
+        for ((k, _), attractor) in undecided.into_iter().zip(again) {
+            found[k] = attractor.or(found[k].take());
+        }
+    }
+    Ok(())
 }
 
 fn edges(samples: &[Sample]) -> Vec<Edge> {
@@ -139,20 +214,58 @@ fn edges(samples: &[Sample]) -> Vec<Edge> {
             upper: pair[1].value,
             below: pair[0].attractor.kind,
             above: pair[1].attractor.kind,
+            bifurcation: None,
+            is_inflection: is_inflection(pair),
         };
         (edge.below != edge.above).then_some(edge)
     };
     samples.windows(2).filter_map(unlike).collect()
 }
 
+fn is_inflection(pair: &[Sample]) -> bool {
+    let cycles = |sample: &Sample| match sample.attractor.kind {
+        Kind::Periodic(_) => sample.attractor.cycles,
+        _ => None,
+    };
+    let (below, above) = (cycles(&pair[0]), cycles(&pair[1]));
+    below.is_some() && below == above
+}
+
+/// The bifurcation at which the orbit below an edge, or else the one above it, ends or loses its
+/// stability.
+fn bifurcation_at(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    samples: &[Sample],
+    edge: &Edge,
+) -> Option<EdgeBifurcation> {
+    if edge.is_inflection {
+        return None;
+    }
+    let beyond = BEYOND * (edge.upper - edge.lower);
+    let sides = [
+        (edge.lower, edge.upper + beyond),
+        (edge.upper, edge.lower - beyond),
+    ];
+    sides.into_iter().find_map(|(value, to)| {
+        let sample = samples.iter().find(|sample| sample.value == value)?;
+        if !matches!(sample.attractor.kind, Kind::Periodic(_)) {
+            return None;
+        }
+        let point = parameter.set(scenario, value);
+        let (kind, value, error) = end_of_orbit(&point, parameter, &sample.attractor.end, to)?;
+        Some(EdgeBifurcation { kind, value, error })
+    })
+}
+
 fn stretches(samples: &[Sample], edges: &[Edge]) -> Vec<Region> {
     let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
         return Vec::new();
     };
-    let froms = std::iter::once(first.value).chain(edges.iter().map(Edge::middle));
+    let froms = std::iter::once(first.value).chain(edges.iter().map(Edge::value));
     let tos = edges
         .iter()
-        .map(Edge::middle)
+        .map(Edge::value)
         .chain(std::iter::once(last.value));
     let kinds = std::iter::once(first.attractor.kind).chain(edges.iter().map(|e| e.above));
     let stretch = |((from, to), kind)| Region { from, to, kind };

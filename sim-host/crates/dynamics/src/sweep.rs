@@ -30,6 +30,14 @@ pub enum Parameter {
 }
 
 impl Parameter {
+    /// Name as in a configuration file.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Speed => "run.wheel_speed_rpm",
+            Self::Amplitude => "dither.amplitude_v",
+        }
+    }
+
     /// Name with unit, as axes and messages show it.
     pub fn name(self) -> &'static str {
         match self {

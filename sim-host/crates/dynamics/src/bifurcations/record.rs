@@ -28,8 +28,8 @@ pub struct OrbitPoint {
     pub cycles: usize,
     /// Heights of all local maxima of the yaw rate in a period, descending, rad/s.
     pub maxima_rad_per_s: Vec<f64>,
-    /// The number of those that stand out by a hundredth of the yaw rate's range.
-    pub prominent_maxima: usize,
+    /// Those that stand out by a hundredth of the yaw rate's range.
+    pub prominent_maxima_rad_per_s: Vec<f64>,
     /// Least yaw rate, rad/s.
     pub yaw_rate_min_rad_per_s: f64,
     /// Greatest yaw rate, rad/s.
@@ -49,18 +49,12 @@ pub struct OrbitPoint {
 }
 
 impl OrbitPoint {
-    pub(super) fn new(vehicle: &Vehicle, orbit: &Vehicles) -> Self {
+    pub(crate) fn new(vehicle: &Vehicle, orbit: &Vehicles) -> Self {
         let extrema = extrema(vehicle, orbit);
         let (low, high) = orbit.extent();
         let heights = || extrema.iter().map(|extremum| extremum.height);
         let least = heights().fold(low[YAW_RATE], f64::min);
         let greatest = heights().fold(high[YAW_RATE], f64::max);
-        let mut maxima: Vec<f64> = extrema
-            .iter()
-            .filter(|e| e.is_maximum)
-            .map(|e| e.height)
-            .collect();
-        maxima.sort_by(|a, b| b.total_cmp(a));
         let middle = 0.5 * (least + greatest);
         let states = orbit
             .segments
@@ -80,8 +74,8 @@ impl OrbitPoint {
             parameter: orbit.parameters[0],
             period_s: orbit.period_s,
             cycles: rises.count(),
-            prominent_maxima: prominent(&extrema, PROMINENCE * (greatest - least)),
-            maxima_rad_per_s: maxima,
+            prominent_maxima_rad_per_s: prominent(&extrema, PROMINENCE * (greatest - least)),
+            maxima_rad_per_s: maxima(&extrema),
             yaw_rate_min_rad_per_s: least,
             yaw_rate_max_rad_per_s: greatest,
             stable: orbit.is_stable(),
@@ -165,9 +159,9 @@ fn extrema(vehicle: &Vehicle, orbit: &Vehicles) -> Vec<Extremum> {
     found
 }
 
-/// The number of maxima that stand out by more than `least`: pairs of neighbouring extrema that differ by
+/// Heights of the maxima that stand out by more than `least`, descending: pairs of neighbouring extrema that differ by
 /// less are taken out, the nearest first.
-fn prominent(extrema: &[Extremum], least: f64) -> usize {
+fn prominent(extrema: &[Extremum], least: f64) -> Vec<f64> {
     let mut left: Vec<Extremum> = extrema.to_vec();
     while left.len() > 2 {
         let difference = |k: usize| (left[(k + 1) % left.len()].height - left[k].height).abs();
@@ -179,7 +173,15 @@ fn prominent(extrema: &[Extremum], least: f64) -> usize {
         left.remove(nearest.max(next));
         left.remove(nearest.min(next));
     }
-    left.iter().filter(|extremum| extremum.is_maximum).count()
+    maxima(&left)
+}
+
+/// Heights of the maxima, descending.
+fn maxima(extrema: &[Extremum]) -> Vec<f64> {
+    let maxima = extrema.iter().filter(|extremum| extremum.is_maximum);
+    let mut heights: Vec<f64> = maxima.map(|extremum| extremum.height).collect();
+    heights.sort_by(|a, b| b.total_cmp(a));
+    heights
 }
 
 /// An equilibrium.

@@ -1,0 +1,200 @@
+//! Whether a trajectory has settled, and on what: the periodic orbit or the equilibrium beside it, by
+//! Newton's method.
+//!
+//! Near a bifurcation a transient is as slow as the greatest multiplier is near the unit circle, so that
+//! maxima that still alternate look like those of twice the period, and a slow spiral like a cycle. The
+//! orbit itself has its multipliers: if they are within the unit circle and the trajectory approaches it,
+//! that is what the trajectory ends on, however long it takes.
+
+use crate::bifurcations::OrbitPoint;
+use crate::equilibria;
+use crate::sweep::Parameter;
+use continuation::Bifurcation;
+use continuation::arclength::Settings;
+use continuation::branch::{Special, follow, orbit_at};
+use continuation::orbit::{Orbit, Shooting};
+use continuation::start::{Search, near_returns, rises};
+use continuation::trajectory::integrate;
+use continuation::vehicle::Vehicle;
+use nalgebra::Vector4;
+use shared_model::Scenario;
+use shared_model::friction::FrictionMode;
+use shared_model::vehicle::YAW_RATE;
+
+/// Length of the trajectory that is compared with the orbit, s.
+const COMPARED_S: f64 = 60.0;
+/// Tolerances of that trajectory, and of the orbit.
+const TRAJECTORY_TOLERANCE: f64 = 1e-9;
+const ORBIT_TOLERANCE: f64 = 1e-11;
+/// Tolerance of a branch whose bifurcation is located.
+const BRANCH_TOLERANCE: f64 = 1e-12;
+/// Most cycles of an orbit.
+const MOST_CYCLES: usize = 8;
+/// A return farther than this, as a share of the trajectory's extent, is none near a stable orbit.
+const FARTHEST: f64 = 0.1;
+/// A distance below which the trajectory is on the orbit, as a share of its extent.
+const ON_ORBIT: f64 = 1e-7;
+/// An orbit of less than this share of the trajectory's extent is the equilibrium within it.
+const SHRUNK: f64 = 1e-2;
+
+pub(crate) type VehicleOrbit = Orbit<FrictionMode, 4>;
+
+/// What a trajectory ends on.
+#[derive(Debug, Clone)]
+pub(crate) enum Settled {
+    /// A stable periodic orbit.
+    Orbit(Box<OrbitPoint>),
+    /// A stable equilibrium.
+    Equilibrium([f64; 4]),
+}
+
+/// What the trajectory from `end` ends on; `None` if it is no stable orbit or equilibrium beside it, or
+/// the trajectory does not approach it.
+pub(crate) fn settled(scenario: &Scenario<f64>, end: &[f64; 4]) -> Option<Settled> {
+    let vehicle = Vehicle::new(scenario, [Parameter::Speed.key(), "vehicle.mass_kg"]).ok()?;
+    let compared = Compared::new(&vehicle, end)?;
+    let is_its_end = |orbit: &VehicleOrbit| orbit.is_stable() && compared.approaches(orbit);
+    match compared.orbits().find(is_its_end) {
+        Some(orbit) => Some(Settled::Orbit(Box::new(OrbitPoint::new(&vehicle, &orbit)))),
+        None => compared.equilibrium(scenario).map(Settled::Equilibrium),
+    }
+}
+
+/// The bifurcation at which the stable orbit beside a trajectory from `end` ends or loses its stability, on
+/// the way of the parameter from the scenario's value towards `to`: its kind, the value and its error.
+pub(crate) fn end_of_orbit(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    end: &[f64; 4],
+    to: f64,
+) -> Option<(&'static str, f64, f64)> {
+    let vehicle = Vehicle::new(scenario, [parameter.key(), "vehicle.mass_kg"]).ok()?;
+    let from = vehicle.parameters()[0];
+    let compared = Compared::new(&vehicle, end)?;
+    let orbit = compared.orbits().find(|orbit| orbit.is_stable())?;
+    let (least, greatest) = Scenario::<f64>::range(parameter.key())?;
+    let range = (from.min(to).max(least), from.max(to).min(greatest));
+    let settings = Settings::over(&[range]);
+    let spans = settings.spans();
+    let problem =
+        Shooting::<_, 4, 6>::new(&vehicle, &orbit.guess(), &spans, 1, BRANCH_TOLERANCE).ok()?;
+    let guess = problem
+        .guess(orbit.start(), orbit.period_s, orbit.parameters)
+        .ok()?;
+    let axis = problem.parameter_axis((to - from).signum());
+    // The first unstable orbit is the last that is needed.
+    let branch = follow(&problem, guess, &axis, &settings, VehicleOrbit::is_stable).ok()?;
+    let is_end = |special: &&Special<FrictionMode, 4>| match special.kind {
+        Bifurcation::PeriodDoubling | Bifurcation::Fold | Bifurcation::NeimarkSacker => true,
+        Bifurcation::BranchPoint | Bifurcation::Grazing => false,
+    };
+    let special = branch.specials.iter().find(is_end)?;
+    let value = special.orbit.parameters[0];
+    Some((special.kind.name(), value, special.parameter_error))
+}
+
+/// A trajectory, to be compared with what is beside it.
+struct Compared<'a> {
+    vehicle: &'a Vehicle,
+    search: Search<4>,
+    /// Its rises of the yaw rate through the middle of its range.
+    crossings: Vec<Vector4<f64>>,
+    level: f64,
+    extent: Vector4<f64>,
+}
+
+impl<'a> Compared<'a> {
+    fn new(vehicle: &'a Vehicle, end: &[f64; 4]) -> Option<Self> {
+        let start = Vector4::from(*end);
+        let parameters = vehicle.parameters();
+        let tolerance = TRAJECTORY_TOLERANCE;
+        let trajectory = integrate(vehicle, parameters, &start, COMPARED_S, tolerance).ok()?;
+        let (low, high) = trajectory.extent();
+        let level = 0.5 * (low[YAW_RATE] + high[YAW_RATE]);
+        let crossings = rises(vehicle, parameters, &trajectory, YAW_RATE, level, tolerance);
+        Some(Self {
+            vehicle,
+            search: Search {
+                start,
+                transient_s: 0.0,
+                observed_s: COMPARED_S,
+                component: YAW_RATE,
+                most_cycles: MOST_CYCLES,
+                tolerance,
+            },
+            crossings: crossings.into_iter().map(|(_, x)| x).collect(),
+            level,
+            extent: high - low,
+        })
+    }
+
+    /// Orbits beside it, by ascending number of cycles.
+    fn orbits(&self) -> impl Iterator<Item = VehicleOrbit> {
+        let returns = near_returns(self.vehicle, self.vehicle.parameters(), &self.search);
+        let returns = returns.unwrap_or_default().into_iter();
+        returns
+            .filter(|found| found.distance < FARTHEST)
+            .filter_map(|found| {
+                let guess = found.guess;
+                let problem =
+                    Shooting::<_, 4, 6>::new(self.vehicle, &guess, &[1.0], 1, ORBIT_TOLERANCE)
+                        .ok()?;
+                let unknowns = problem
+                    .guess(&guess.start, guess.period_s, guess.parameters)
+                    .ok()?;
+                let orbit = orbit_at(&problem, unknowns).ok()?;
+                (orbit.size() > SHRUNK * self.extent.amax()).then_some(orbit)
+            })
+    }
+
+    /// The trajectory's crossings come nearer to the orbit's, or are on it.
+    fn approaches(&self, orbit: &VehicleOrbit) -> bool {
+        let vehicle = self.vehicle;
+        let tolerance = TRAJECTORY_TOLERANCE;
+        // More than a period, so that no crossing is at its end.
+        let length_s = 1.5 * orbit.period_s;
+        let Ok(once) = integrate(
+            vehicle,
+            orbit.parameters,
+            orbit.start(),
+            length_s,
+            tolerance,
+        ) else {
+            return false;
+        };
+        let own = rises(
+            vehicle,
+            orbit.parameters,
+            &once,
+            YAW_RATE,
+            self.level,
+            tolerance,
+        );
+        let distance = |x: &Vector4<f64>| {
+            let apart = own
+                .iter()
+                .map(|(_, other)| (x - other).component_div(&self.extent).amax());
+            apart.fold(f64::INFINITY, f64::min)
+        };
+        let quarter = self.crossings.len() / 4;
+        if quarter == 0 || own.is_empty() {
+            return false;
+        }
+        let greatest = |of: &[Vector4<f64>]| of.iter().map(distance).fold(0.0, f64::max);
+        let first = greatest(&self.crossings[..quarter]);
+        let last = greatest(&self.crossings[self.crossings.len() - quarter..]);
+        last < ON_ORBIT || (last < first && last < FARTHEST)
+    }
+
+    /// The stable equilibrium that a spiral shrinks to.
+    fn equilibrium(&self, scenario: &Scenario<f64>) -> Option<[f64; 4]> {
+        let (first, last) = (self.crossings.first()?, self.crossings.last()?);
+        let all = equilibria::find(scenario).ok()?;
+        let apart = |x: &Vector4<f64>, state: &[f64; 4]| (x - Vector4::from(*state)).norm();
+        let nearest = all
+            .iter()
+            .min_by(|a, b| apart(last, &a.state).total_cmp(&apart(last, &b.state)))?;
+        let shrinks = apart(last, &nearest.state) < apart(first, &nearest.state);
+        (nearest.stable && shrinks).then_some(nearest.state)
+    }
+}
