@@ -373,11 +373,14 @@ fn show(found: &Bifurcations) {
             .filter(|special| special.branch == number)
         {
             let orbit = &special.orbit;
+            let error = match special.parameter_error {
+                error if error.is_finite() => format!("+- {error:.0e}"),
+                _ => "(error unknown)".into(),
+            };
             say!(
-                "  {} at {key} = {:.8} +- {:.0e}: period {:.6} s, {}, {}",
+                "  {} at {key} = {:.8} {error}: period {:.6} s, {}, {}",
                 special.kind,
                 special.parameter,
-                special.parameter_error,
                 orbit.period_s,
                 counted(orbit.cycles, "cycle"),
                 counted_as(orbit.maxima_rad_per_s.len(), "maximum", "maxima")

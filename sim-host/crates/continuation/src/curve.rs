@@ -15,8 +15,11 @@ const DISPLACEMENT: f64 = 1e-6;
 /// The equations of a problem in two parameters, and a function of its solutions that is to be zero.
 struct Zero<P: Problem> {
     inner: P,
-    test: Rc<dyn Fn(&P::Solution) -> f64>,
+    test: Test<P::Solution>,
 }
+
+/// A test function, shared by the problems along a curve.
+type Test<S> = Rc<dyn Fn(&S) -> f64>;
 
 impl<P: Problem> Clone for Zero<P> {
     fn clone(&self) -> Self {

@@ -373,13 +373,13 @@ where
             now = next;
         }
         // Aitken and Neville: the row below, from the one above.
-        for k in 0..column {
+        for (k, above) in row[..column].iter_mut().enumerate() {
             let ratio = (column + 1) as f64 / (column - k) as f64;
             let weight = T::from_f64(1.0 / (ratio * ratio - 1.0));
-            let above = row[k];
-            row[k] = now;
-            now = SVector::from_fn(|i, _| now[i] + (now[i] - above[i]) * weight);
-            error = SVector::from_fn(|i, _| now[i] - row[k][i]);
+            let (last, at_this) = (*above, now);
+            *above = at_this;
+            now = SVector::from_fn(|i, _| at_this[i] + (at_this[i] - last[i]) * weight);
+            error = SVector::from_fn(|i, _| now[i] - at_this[i]);
         }
         row[column] = now;
     }
@@ -444,8 +444,8 @@ where
     }
     let shift = |x: &mut SVector<Dual<K>, N>, rates: &SVector<f64, N>, sign: f64| {
         for i in 0..N {
-            for k in 0..K {
-                x[i].tangent[k] += sign * rates[i] * delays_s[k];
+            for (tangent, delay_s) in x[i].tangent.iter_mut().zip(delays_s) {
+                *tangent += sign * rates[i] * delay_s;
             }
         }
     };

@@ -214,3 +214,84 @@ fn a_trajectory_that_comes_to_rest_has_no_branch() {
         found.without_branch
     );
 }
+
+mod edges {
+    use dynamics::attractor::Kind;
+    use dynamics::regions::{Regions, regions};
+    use dynamics::sweep::{Parameter, RunControl, Timing, Values, mirrored};
+    use shared_model::Scenario;
+    use shared_model::dither::Waveform;
+
+    fn over(
+        scenario: &Scenario<f64>,
+        parameter: Parameter,
+        from: f64,
+        to: f64,
+        step: f64,
+    ) -> Regions {
+        let values = Values::new("values", from, to, step).unwrap();
+        let timing = Timing::new(200.0, 600.0).unwrap();
+        let width = parameter.edge_width();
+        regions(
+            scenario,
+            parameter,
+            &values,
+            width,
+            timing,
+            RunControl::none(),
+        )
+        .unwrap()
+    }
+
+    /// Just below a doubling maxima alternate for longer than any run; the regions end where a multiplier
+    /// is -1.
+    #[test]
+    fn an_edge_at_a_period_doubling_is_no_transient() {
+        for (coefficient, from, wanted) in
+            [(0.28, 1630.0, 1639.188_836), (0.0, 1720.0, 1730.293_623)]
+        {
+            let mut scenario = Scenario::reconstruction();
+            scenario.friction.coefficient = coefficient;
+            let found = over(&scenario, Parameter::Speed, from, from + 15.0, 2.5);
+            let edge = found.edges[0];
+            assert_eq!(edge.below, Kind::Periodic(2), "{:?}", found.edges);
+            let at = edge.bifurcation.unwrap();
+            assert_eq!(at.kind, "period doubling");
+            assert!((at.value - wanted).abs() < 1e-5, "{at:?}");
+            assert!((found.regions[0].to - wanted).abs() < 1e-5);
+            assert!(
+                found
+                    .edges
+                    .iter()
+                    .all(|edge| edge.above != Kind::Periodic(4))
+            );
+        }
+    }
+
+    /// A slow spiral below the Hopf bifurcation comes to rest, above it it does not.
+    #[test]
+    fn a_slow_spiral_is_an_equilibrium() {
+        let mut scenario = Scenario::reconstruction();
+        scenario.friction.coefficient = 0.0;
+        let found = over(&mirrored(&scenario), Parameter::Speed, 1646.0, 1653.0, 1.0);
+        let [edge] = &found.edges[..] else {
+            panic!("{:?}", found.edges);
+        };
+        assert_eq!(edge.below, Kind::Equilibrium);
+        assert!(edge.lower < 1650.817_4 && edge.upper > 1650.5, "{edge:?}");
+    }
+
+    /// The cycle gains a maximum of the yaw rate: an inflection of the same orbit.
+    #[test]
+    fn an_edge_between_counts_of_maxima_is_no_bifurcation() {
+        let mut scenario = Scenario::reconstruction();
+        scenario.dither.waveform = Waveform::Sine;
+        let found = over(&scenario, Parameter::Amplitude, 0.72, 0.76, 0.02);
+        let [edge] = &found.edges[..] else {
+            panic!("{:?}", found.edges);
+        };
+        assert!(edge.is_inflection && edge.bifurcation.is_none(), "{edge:?}");
+        let cycles = found.samples.iter().map(|sample| sample.attractor.cycles);
+        assert!(cycles.into_iter().all(|cycles| cycles == Some(1)));
+    }
+}

@@ -22,7 +22,7 @@ use continuation::start::{Search, near_returns};
 use continuation::vehicle::{InvalidParameter, Vehicle};
 use continuation::{Bifurcation, Failure, curve, equilibrium};
 use engine::taylor::{Observables, Trajectory};
-use nalgebra::{DVector, Vector4};
+use nalgebra::{DVector, Vector2, Vector4};
 use shared_model::friction::FrictionMode;
 use shared_model::vehicle::YAW_RATE;
 use shared_model::{InvalidScenario, Scenario};
@@ -41,6 +41,10 @@ const MOST_CYCLES: usize = 16;
 const BESIDE_HOPF: f64 = 0.02;
 /// Arclengths of the first step on a branch of twice the period, one after another.
 const BESIDE_DOUBLING: [f64; 4] = [0.01, 0.003, 0.001, 0.0003];
+/// Most points on each side of a curve.
+const MOST_CURVE_POINTS: usize = 200;
+/// A bifurcation nearer to a curve than this, as a share of both ranges, is on it.
+const ON_CURVE: f64 = 2e-3;
 /// Two bifurcations of the same kind nearer than this, as a share of the range, are one.
 const SAME: f64 = 1e-6;
 
@@ -201,7 +205,7 @@ pub fn bifurcations(plan: &Plan) -> Result<Bifurcations, BifurcationsError> {
     let _ = interrupt::catch(|| {
         let hopf = work.equilibria()?;
         work.orbits();
-        work.from_hopf(&hopf);
+        work.born_by_hopf(&hopf);
         work.doubled();
         work.curves(&hopf);
         Ok::<_, InvalidScenario>(())
@@ -300,8 +304,12 @@ impl<'a> Work<'a> {
                 folds: folds.collect(),
             });
             for hopf in down.hopf.into_iter().chain(up.hopf) {
-                self.found.hopf.push(HopfPoint::new(&hopf));
-                all.push(hopf);
+                // Two equilibria may be on one branch.
+                let is_same = |other: &Hopf<4>| (other.at.x - hopf.at.x).amax() < SAME;
+                if !all.iter().any(is_same) {
+                    self.found.hopf.push(HopfPoint::new(&hopf));
+                    all.push(hopf);
+                }
             }
         }
         self.found
@@ -423,13 +431,13 @@ impl<'a> Work<'a> {
 
     /// Branches of the orbits that are born at Hopf bifurcations. Where the steering can stick there are
     /// none: small oscillations come to rest.
-    fn from_hopf(&mut self, all: &[Hopf<4>]) {
+    fn born_by_hopf(&mut self, all: &[Hopf<4>]) {
         if self.vehicle.can_stick() {
             return;
         }
         for hopf in all {
             let origin = format!("the Hopf bifurcation at {:.6}", hopf.at.parameters[0]);
-            if let Err(failure) = self.born(&origin, hopf) {
+            if let Err(failure) = self.beside_hopf(&origin, hopf) {
                 self.found
                     .without_branch
                     .push(format!("{origin}: {failure}"));
@@ -437,7 +445,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    fn born(&mut self, origin: &str, hopf: &Hopf<4>) -> Result<(), Failure> {
+    fn beside_hopf(&mut self, origin: &str, hopf: &Hopf<4>) -> Result<(), Failure> {
         let vehicle = self.vehicle.clone();
         let mode = vehicle.mode_of_slipping(&hopf.at.x);
         let spans = self.settings.spans();
@@ -521,7 +529,7 @@ impl<'a> Work<'a> {
                 continue;
             }
             let origin = format!("the period doubling at {:.6}", orbit.parameters[0]);
-            if let Err(failure) = self.born_by_doubling(&origin, &orbit, depth + 1) {
+            if let Err(failure) = self.beside_doubling(&origin, &orbit, depth + 1) {
                 self.found
                     .without_branch
                     .push(format!("{origin}: {failure}"));
@@ -529,7 +537,7 @@ impl<'a> Work<'a> {
         }
     }
 
-    fn born_by_doubling(
+    fn beside_doubling(
         &mut self,
         origin: &str,
         orbit: &Orbit<FrictionMode, 4>,
@@ -563,17 +571,19 @@ impl<'a> Work<'a> {
         )
     }
 
-    /// Curves of the bifurcations in both parameters.
+    /// Curves of the bifurcations in both parameters: of those on branches that are not born by a doubling.
     fn curves(&mut self, hopf: &[Hopf<4>]) {
         let Some((_, range)) = &self.plan.second else {
             return;
         };
-        let settings = Settings::over(&[self.plan.range, *range]);
+        let mut settings = Settings::over(&[self.plan.range, *range]);
+        settings.most_points = MOST_CURVE_POINTS;
         let vehicle = self.vehicle.clone();
         for number in 0..self.located.len() {
-            let special = &self.located[number].special;
+            let Located { special, depth } = &self.located[number];
             let (kind, orbit) = (special.kind, special.orbit.clone());
-            if kind == Bifurcation::Grazing {
+            let has_no_curve = kind == Bifurcation::Grazing || *depth > 0;
+            if has_no_curve || self.is_on_curve(kind.name(), orbit.parameters, &settings) {
                 continue;
             }
             let follow = |sign| {
@@ -581,7 +591,7 @@ impl<'a> Work<'a> {
                 curve::of_orbits(&problem, kind, &orbit, sign, &settings, going_on)
             };
             let sides = [follow(-1.0), follow(1.0)];
-            self.keep_curve(kind.name(), sides, |orbit| CurvePoint::of_orbit(orbit));
+            self.keep_curve(kind.name(), sides, CurvePoint::of_orbit);
         }
         for hopf in hopf {
             let mode = vehicle.mode_of_slipping(&hopf.at.x);
@@ -593,6 +603,23 @@ impl<'a> Work<'a> {
                 CurvePoint::of_equilibrium,
             );
         }
+    }
+
+    /// Whether a curve of that kind passes through the parameters.
+    fn is_on_curve(&self, kind: &str, at: [f64; 2], settings: &Settings) -> bool {
+        let spans = settings.spans();
+        let scaled = |p: [f64; 2]| Vector2::new(p[0] / spans[0], p[1] / spans[1]);
+        let passes = |pair: &[CurvePoint]| {
+            let (from, to) = (scaled(pair[0].parameters), scaled(pair[1].parameters));
+            let along = to - from;
+            let share = (scaled(at) - from).dot(&along) / along.norm_squared();
+            let nearest = from + along * share.clamp(0.0, 1.0);
+            (nearest - scaled(at)).norm() < ON_CURVE
+        };
+        let of_kind = self.found.curves.iter().filter(|curve| curve.kind == kind);
+        of_kind
+            .into_iter()
+            .any(|curve| curve.points.windows(2).any(passes))
     }
 
     /// Joins both sides of a curve.
