@@ -3,7 +3,7 @@
 use super::material::Judgement;
 use crate::paper::{CLAIMS, REGION_EDGES_RPM, Reproduced, chaos_begins_at};
 use dynamics::attractor::Kind;
-use dynamics::regions::{Regions, Sample};
+use dynamics::regions::{EdgeBifurcation, Regions, Sample};
 
 /// A region's edge counts as the paper's within 1 % of it.
 const EDGE_SHARE: f64 = 0.01;
@@ -55,6 +55,11 @@ pub fn of_speeds(preset: &str, sweep: &Regions) -> Vec<Judgement> {
             distance: edges
                 .iter()
                 .map(edge_distance)
+                .chain(
+                    edges
+                        .iter()
+                        .filter_map(|(claimed, _)| bifurcation_near(sweep, *claimed)),
+                )
                 .collect::<Vec<_>>()
                 .join("; "),
             verdict,
@@ -89,8 +94,8 @@ pub fn of_square_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
             distance: last_chaos.map_or_else(String::new, |edge| {
                 format!(
                     "chaos ends at {:.4} \u{b1} {:.4} V",
-                    edge.middle(),
-                    0.5 * (edge.upper - edge.lower)
+                    edge.value(),
+                    edge.error()
                 )
             }),
             verdict: match (chaotic_at_first, tamed, periodic) {
@@ -119,7 +124,18 @@ pub fn of_sine_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
         .edges
         .iter()
         .filter(ones)
-        .map(|edge| format!("{:.4} V", edge.middle()))
+        .map(|edge| {
+            let inflection = if edge.is_inflection {
+                ", an inflection"
+            } else {
+                ""
+            };
+            format!(
+                "{:.4} \u{b1} {:.4} V{inflection}",
+                edge.value(),
+                edge.error()
+            )
+        })
         .collect();
     let (before, after) = (kind_at(sweep, 0.0), kind_at(sweep, 1.0));
     let chaos = before.is_some_and(Kind::is_chaotic);
@@ -132,10 +148,7 @@ pub fn of_sine_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
             distance: if edges.is_empty() {
                 "no edge of period-1 in the sweep".into()
             } else {
-                format!(
-                    "period-1 begins or ends at {} (\u{b1} 0.25 mV)",
-                    edges.join(", ")
-                )
+                format!("period-1 begins or ends at {}", edges.join("; "))
             },
             verdict: match share {
                 share if share > 0.999 => Reproduced::Yes,
@@ -212,9 +225,18 @@ fn composition(sweep: &Regions, from: f64, to: f64) -> String {
 fn nearest_edge_of_chaos(sweep: &Regions, claimed: f64) -> Option<(f64, f64)> {
     let begins = chaos_begins_at(claimed);
     let of_chaos = sweep.edges.iter().filter(|edge| edge.is_of_chaos(begins));
-    let apart = |edge: &&dynamics::regions::Edge| (edge.middle() - claimed).abs();
+    let apart = |edge: &&dynamics::regions::Edge| (edge.value() - claimed).abs();
     let nearest = of_chaos.min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
-    Some((nearest.middle(), 0.5 * (nearest.upper - nearest.lower)))
+    Some((nearest.value(), nearest.error()))
+}
+
+/// The bifurcation of an orbit that is nearest to `claimed`, if it is near.
+fn bifurcation_near(sweep: &Regions, claimed: f64) -> Option<String> {
+    let all = sweep.edges.iter().filter_map(|edge| edge.bifurcation);
+    let apart = |at: &EdgeBifurcation| (at.value - claimed).abs();
+    let nearest = all.min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    let is_near = apart(&nearest) <= EDGE_SHARE * claimed;
+    is_near.then(|| format!("{} at {:.4} rpm", nearest.kind, nearest.value))
 }
 
 fn edge_distance((claimed, found): &(f64, Option<(f64, f64)>)) -> String {

@@ -105,7 +105,7 @@ fn nearest(sweep: &Regions, claimed: f64) -> Option<f64> {
     let begins = chaos_begins_at(claimed);
     let of_chaos = sweep.edges.iter().filter(|edge| edge.is_of_chaos(begins));
     let near = of_chaos
-        .map(Edge::middle)
+        .map(Edge::value)
         .filter(|middle| (middle - claimed).abs() <= NEAR_RPM);
     near.min_by(|a, b| (a - claimed).abs().total_cmp(&(b - claimed).abs()))
 }

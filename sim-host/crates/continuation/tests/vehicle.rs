@@ -64,7 +64,7 @@ fn the_doubling_without_friction_is_that_of_another_program() {
         (1700.0, 1760.0),
         TOLERANCE,
     ));
-    assert!((rpm - 1730.293_623_033).abs() < 5e-7, "{rpm:.9}");
+    assert!((rpm - 1730.293623033).abs() < 5e-7, "{rpm:.9}");
     assert!(error < 5e-6, "{error:e}");
 }
 
@@ -83,7 +83,7 @@ fn the_doubling_with_stick_slip_converges_with_the_tolerance() {
     let (coarse, fine, finest) = (of(1e-8), of(1e-11), of(1e-13));
     assert!((fine - finest).abs() < 1e-6, "{fine:.9} {finest:.9}");
     assert!((coarse - finest).abs() < 1e-3, "{coarse:.9} {finest:.9}");
-    assert!((finest - 1639.188_836).abs() < 1e-5, "{finest:.9}");
+    assert!((finest - 1639.188836).abs() < 1e-5, "{finest:.9}");
 }
 
 /// The multipliers are the derivative of what the trajectory does.

@@ -66,6 +66,14 @@ impl Edge {
             .unwrap_or(self.middle())
     }
 
+    /// Uncertainty of that value.
+    pub fn error(&self) -> f64 {
+        match self.bifurcation {
+            Some(bifurcation) if bifurcation.value == self.value() => bifurcation.error,
+            _ => 0.5 * (self.upper - self.lower),
+        }
+    }
+
     /// Chaos in one band begins or ends here: some above and none below, or the other way round.
     pub fn is_of_chaos(&self, begins: bool) -> bool {
         let (from, to) = if begins {

@@ -247,8 +247,7 @@ mod edges {
     /// is -1.
     #[test]
     fn an_edge_at_a_period_doubling_is_no_transient() {
-        for (coefficient, from, wanted) in
-            [(0.28, 1630.0, 1639.188_836), (0.0, 1720.0, 1730.293_623)]
+        for (coefficient, from, wanted) in [(0.28, 1630.0, 1639.188836), (0.0, 1720.0, 1730.293623)]
         {
             let mut scenario = Scenario::reconstruction();
             scenario.friction.coefficient = coefficient;
@@ -278,7 +277,7 @@ mod edges {
             panic!("{:?}", found.edges);
         };
         assert_eq!(edge.below, Kind::Equilibrium);
-        assert!(edge.lower < 1650.817_4 && edge.upper > 1650.5, "{edge:?}");
+        assert!(edge.lower < 1650.8174 && edge.upper > 1650.5, "{edge:?}");
     }
 
     /// The cycle gains a maximum of the yaw rate: an inflection of the same orbit.

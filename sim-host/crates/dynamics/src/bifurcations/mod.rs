@@ -194,7 +194,7 @@ pub struct Bifurcations {
 /// };
 /// let diagram = bifurcations(&plan)?;
 /// let doubling = diagram.specials.iter().find(|special| special.kind == "period doubling").unwrap();
-/// assert!((doubling.parameter - 1730.293_62).abs() < 1e-4);
+/// assert!((doubling.parameter - 1730.29362).abs() < 1e-4);
 /// let hopf = &diagram.hopf[0];
 /// assert!((hopf.parameter - 1650.817).abs() < 1e-3 && hopf.first_lyapunov_coefficient > 0.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

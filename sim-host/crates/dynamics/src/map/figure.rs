@@ -1,6 +1,7 @@
 //! Exponent, period and extent of the motion over wheel speed and dither amplitude.
 
 use crate::map::cell::{Cell, Kind};
+use crate::map::curves::curves;
 use crate::map::plan::{Grid, Plan, Sheet, Start};
 use plot::axes::{Axes, CAPTION, TICKS_AND_NAME};
 use plot::axis::{Axis, bounds};
@@ -19,6 +20,9 @@ const TICKS_UP: usize = 6;
 const BESIDE: i32 = 184;
 /// Distance of two shades in the key.
 const KEY_STEP: usize = 46;
+/// Curves of bifurcations, with a light edge on dark cells.
+const CURVE: Line = Line::solid(Colour(0xc4, 0x14, 0x14), 4);
+const CURVE_EDGE: Line = Line::solid(Colour(0xfe, 0xfd, 0xfd), 8);
 /// Cells without the number that a panel shows.
 const NONE: Colour = Colour(0x2a, 0x2a, 0x2b);
 /// Exponents are drawn down to this multiple of the greatest: how fast a motion settles is not the
@@ -162,7 +166,7 @@ impl Class {
 
 /// The map as an SVG document: a column of panels for each sheet side by side with that of another
 /// waveform from the same start, the starts below each other. `cells` are all of the plan, in its
-/// order.
+/// order. Over the periods are the period doublings and folds by continuation.
 pub fn draw(plan: &Plan, cells: &[Cell]) -> String {
     let sheets: Vec<(&Sheet, &[Cell])> = plan
         .sheets
@@ -205,6 +209,11 @@ fn draw_row(
             None => Class::of(cell).colour(),
         };
         panel.raster(from, to, &raster(sheet, cells, colour));
+        if matches!(shown, Shown::Period) {
+            for curve in curves(plan, sheet, cells) {
+                panel.lines(&[(&curve, CURVE_EDGE), (&curve, CURVE)]);
+            }
+        }
     }
     let ends = (CAPTION, CAPTION + PANEL_HEIGHT);
     match &scale {

@@ -13,6 +13,7 @@
 //! depends on the plan alone: not on threads, on interruptions, or on where its tile was made.
 
 pub mod cell;
+mod curves;
 pub mod figure;
 pub mod plan;
 pub mod table;
