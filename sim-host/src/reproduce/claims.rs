@@ -93,9 +93,8 @@ pub fn of_square_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
             ),
             distance: last_chaos.map_or_else(String::new, |edge| {
                 format!(
-                    "chaos ends at {:.4} \u{b1} {:.4} V",
-                    edge.value(),
-                    edge.error()
+                    "chaos ends at {} V",
+                    with_error(edge.value(), edge.error(), 4)
                 )
             }),
             verdict: match (chaotic_at_first, tamed, periodic) {
@@ -131,9 +130,8 @@ pub fn of_sine_amplitudes(preset: &str, sweep: &Regions) -> Vec<Judgement> {
                 ""
             };
             format!(
-                "{:.4} \u{b1} {:.4} V{inflection}",
-                edge.value(),
-                edge.error()
+                "{} V{inflection}",
+                with_error(edge.value(), edge.error(), 4)
             )
         })
         .collect();
@@ -230,6 +228,15 @@ fn nearest_edge_of_chaos(sweep: &Regions, claimed: f64) -> Option<(f64, f64)> {
     Some((nearest.value(), nearest.error()))
 }
 
+/// A value with its error, or with two more digits if the error is below them.
+fn with_error(value: f64, error: f64, digits: usize) -> String {
+    let exact = digits + 2;
+    if error < 0.5 * 0.1_f64.powi(exact as i32) {
+        return format!("{value:.exact$}");
+    }
+    format!("{value:.digits$} \u{b1} {error:.digits$}")
+}
+
 /// The bifurcation of an orbit that is nearest to `claimed`, if it is near.
 fn bifurcation_near(sweep: &Regions, claimed: f64) -> Option<String> {
     let all = sweep.edges.iter().filter_map(|edge| edge.bifurcation);
@@ -242,7 +249,8 @@ fn bifurcation_near(sweep: &Regions, claimed: f64) -> Option<String> {
 fn edge_distance((claimed, found): &(f64, Option<(f64, f64)>)) -> String {
     match found {
         Some((middle, half)) => format!(
-            "edge of chaos at {middle:.1} \u{b1} {half:.1} rpm, {:+.1} from {claimed:.0}",
+            "edge of chaos at {} rpm, {:+.1} from {claimed:.0}",
+            with_error(*middle, *half, 1),
             middle - claimed
         ),
         None => format!("no edge of chaos near {claimed:.0}"),

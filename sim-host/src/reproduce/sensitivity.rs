@@ -3,7 +3,7 @@
 use super::job::Quality;
 use super::material::{Drawing, Made, Material, Named, Table};
 use crate::paper::{REGION_EDGES_RPM, chaos_begins_at};
-use dynamics::regions::{Edge, Regions, regions};
+use dynamics::regions::{Edge, Regions, regions_of_trajectories};
 use dynamics::sweep::{Parameter, RunControl, SweepError, Timing, Values};
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
 use shared_model::Scenario;
@@ -97,7 +97,7 @@ fn edges(
         Quality::Full => (10.0, 1.0, Timing::new(100.0, 250.0)?),
     };
     let values = Values::new("wheel speed", 1580.0, 1920.0, step)?;
-    let sweep = regions(scenario, Parameter::Speed, &values, width, timing, watch)?;
+    let sweep = regions_of_trajectories(scenario, Parameter::Speed, &values, width, timing, watch)?;
     Ok(REGION_EDGES_RPM.map(|edge| nearest(&sweep, edge)))
 }
 

@@ -2,7 +2,7 @@
 
 use crate::equilibria::Equilibrium;
 use crate::lyapunov::{Exponent, largest_of};
-use crate::observe::observe;
+use crate::observe::{is_supported, observe};
 use crate::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
 use crate::settled::{Settled, settled};
 use crate::sweep::{RunControl, Timing};
@@ -165,13 +165,14 @@ impl Attractor {
     }
 
     /// The same, or what Newton's method finds beside a trajectory that has not settled.
-    fn decided(mut self, scenario: &Scenario<f64>) -> Self {
+    pub(crate) fn decided(mut self, scenario: &Scenario<f64>) -> Self {
         let is_doubtful = match self.kind {
             Kind::Undecided => true,
             Kind::Periodic(_) => self.residual.is_some_and(|residual| residual > UNSETTLED),
             _ => false,
         };
-        if !is_doubtful {
+        // Where friction has modes in which trajectories slide, there is no engine and no shooting.
+        if !is_doubtful || !is_supported(scenario).is_ok_and(|supported| supported) {
             return self;
         }
         match settled(scenario, &self.end) {
@@ -249,8 +250,7 @@ impl Attractor {
 ///
 /// The period is that of the yaw rate's maxima over the time observed, to 0.2 % of its range. If
 /// `with_exponent`, the largest Lyapunov exponent has to agree, positive only where there is no
-/// period, and a trajectory that has not settled is decided by the orbit or equilibrium beside it; else a
-/// motion without period stays undecided, and one with period is taken as such.
+/// period; else a motion without period stays undecided, and one with period is taken as such.
 ///
 /// # Errors
 /// If a scenario is not valid.
@@ -265,8 +265,7 @@ pub fn attractors(
         section: None,
     };
     if with_exponent {
-        let see =
-            |scenario: &_, found: &Trajectory<1>| Attractor::of(found, timing).decided(scenario);
+        let see = |_: &_, found: &Trajectory<1>| Attractor::of(found, timing);
         observe(scenarios, timing, observables, control, see)
     } else {
         let see = |_: &_, found: &Trajectory<0>| Attractor::of(found, timing);

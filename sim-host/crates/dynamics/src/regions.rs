@@ -2,17 +2,19 @@
 
 use crate::attractor::{Attractor, Kind, attractors};
 use crate::equilibria;
+use crate::observe::is_supported;
 use crate::settled::end_of_orbit;
 use crate::simulate::started_at;
 use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
+use rayon::prelude::*;
 use shared_model::Scenario;
 use shared_model::vehicle::Model;
 
 /// Further transients of a trajectory that is undecided, in lengths of a run.
-const LONGER: [f64; 2] = [10.0, 40.0];
+const LONGER: [f64; 1] = [10.0];
 /// The longest of them, s.
-const LONGEST_S: f64 = 20_000.0;
+const LONGEST_S: f64 = 10_000.0;
 /// How far beyond an edge its bifurcation is searched for, in widths of its interval.
 const BEYOND: f64 = 20.0;
 
@@ -150,13 +152,43 @@ pub fn regions(
     timing: Timing,
     control: RunControl,
 ) -> Result<Regions, SweepError> {
+    sweep(scenario, parameter, values, (width, timing), true, control)
+}
+
+/// As [`regions`], by what trajectories show in their time alone: transients near bifurcations included, and
+/// several times as fast.
+///
+/// # Errors
+/// If a value's scenario is not valid.
+pub fn regions_of_trajectories(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    values: &Values,
+    width: f64,
+    timing: Timing,
+    control: RunControl,
+) -> Result<Regions, SweepError> {
+    sweep(scenario, parameter, values, (width, timing), false, control)
+}
+
+fn sweep(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    values: &Values,
+    (width, timing): (f64, Timing),
+    is_exact: bool,
+    control: RunControl,
+) -> Result<Regions, SweepError> {
     let mut level = scenarios(scenario, parameter, values)?;
     let mut samples: Vec<Sample> = Vec::new();
     let mut complete = true;
     while complete && !level.is_empty() {
         let mut found = attractors(&level, timing, true, control)?;
         complete = found.iter().all(Option::is_some);
-        prolong(&level, &mut found, timing, control)?;
+        if is_exact {
+            decide(&level, &mut found);
+            prolong(&level, &mut found, timing, control)?;
+        }
         let sampled = level.iter().zip(found).filter_map(|(scenario, attractor)| {
             let value = parameter.of(scenario);
             attractor.map(|attractor| Sample { value, attractor })
@@ -171,7 +203,7 @@ pub fn regions(
             .collect();
     }
     let mut edges = edges(&samples);
-    if complete {
+    if complete && is_exact {
         for edge in &mut edges {
             edge.bifurcation = bifurcation_at(scenario, parameter, &samples, edge);
         }
@@ -182,6 +214,14 @@ pub fn regions(
         edges,
         complete,
     })
+}
+
+/// Decides trajectories that have not settled by the orbit or equilibrium beside them.
+fn decide(scenarios: &[Scenario<f64>], found: &mut [Option<Attractor>]) {
+    let pairs = scenarios.par_iter().zip(found);
+    pairs.for_each(|(scenario, found)| {
+        *found = found.take().map(|attractor| attractor.decided(scenario));
+    });
 }
 
 /// Continues the trajectories that are undecided for longer: near a bifurcation they leave an orbit as
@@ -198,7 +238,9 @@ fn prolong(
                 let attractor = found[k].as_ref()?;
                 let state = Model::new(&scenarios[k]).state(attractor.end.into());
                 let continued = started_at(&scenarios[k], &state);
-                (attractor.kind == Kind::Undecided).then_some((k, continued))
+                let is_undecided = attractor.kind == Kind::Undecided;
+                let supported = is_undecided && is_supported(&continued).is_ok_and(|yes| yes);
+                supported.then_some((k, continued))
             })
             .collect();
         let continued: Vec<Scenario<f64>> =
@@ -207,7 +249,8 @@ fn prolong(
             transient_s: (factor * timing.time_s()).min(LONGEST_S),
             ..timing
         };
-        let again = attractors(&continued, longer, true, control)?;
+        let mut again = attractors(&continued, longer, true, control)?;
+        decide(&continued, &mut again);
         for ((k, _), attractor) in undecided.into_iter().zip(again) {
             found[k] = attractor.or(found[k].take());
         }

@@ -1,5 +1,5 @@
-//! Curves of bifurcations over a sheet of the map: period doublings and folds of the orbit of the widest
-//! range of amplitudes with a period.
+//! Curves of bifurcations over a sheet of the map: period doublings and folds of the orbits in the
+//! widest ranges of amplitudes with a period.
 
 use super::cell::{Cell, Kind};
 use super::plan::{Place, Plan, Sheet};
@@ -11,14 +11,42 @@ const TOLERANCE: f64 = 1e-10;
 /// Transient before the orbit, s.
 const TRANSIENT_S: f64 = 200.0;
 
-/// Points of each curve: wheel speed, rpm, and amplitude, V. None if the sheet has no cell with a period
-/// at its middle speed.
-pub(super) fn curves(plan: &Plan, sheet: &Sheet, cells: &[Cell]) -> Vec<Vec<(f64, f64)>> {
+/// Places of the orbits to begin with, as shares of the range of speeds.
+const PLACES: [f64; 2] = [0.5, 0.85];
+/// Curves nearer than this at a point, as a share of both ranges, are one.
+const SAME: f64 = 0.01;
+
+/// Points of a curve: wheel speed, rpm, and amplitude, V.
+pub(super) type Curve = Vec<(f64, f64)>;
+
+/// The curves of a sheet; none where no cell has a period.
+pub(super) fn curves(plan: &Plan, sheet: &Sheet, cells: &[Cell]) -> Vec<Curve> {
     let (speeds, amplitudes) = (&plan.speeds_rpm, &sheet.amplitudes_v);
     if speeds.count < 2 || amplitudes.count < 2 {
         return Vec::new();
     }
-    let column = speeds.count / 2;
+    let spans = (speeds.to - speeds.from, amplitudes.to - amplitudes.from);
+    let mut all: Vec<Curve> = Vec::new();
+    for place in PLACES {
+        let column = (place * speeds.count as f64) as usize;
+        for curve in curves_from(plan, sheet, cells, column) {
+            let Some(&(rpm, amplitude_v)) = curve.get(curve.len() / 2) else {
+                continue;
+            };
+            let passes = |&(x, y): &(f64, f64)| {
+                ((x - rpm) / spans.0).hypot((y - amplitude_v) / spans.1) < SAME
+            };
+            if !all.iter().flatten().any(passes) {
+                all.push(curve);
+            }
+        }
+    }
+    all
+}
+
+/// The curves of the orbit in the widest range of amplitudes with a period in a column.
+fn curves_from(plan: &Plan, sheet: &Sheet, cells: &[Cell], column: usize) -> Vec<Curve> {
+    let (speeds, amplitudes) = (&plan.speeds_rpm, &sheet.amplitudes_v);
     let is_periodic = |row: usize| cells[column * amplitudes.count + row].kind == Kind::Periodic;
     let Some(row) = middle_of_longest(amplitudes.count, is_periodic) else {
         return Vec::new();

@@ -200,7 +200,11 @@ fn draw_row(
     for ((sheet, cells), area) in sheets.iter().zip(panels.columns(sheets.len())) {
         let (x, y) = axes(plan, sheet);
         let (from, to) = ((x.low, y.low), (x.high, y.high));
-        let caption = format!("{}: {}", name(sheet), shown.name());
+        let curves_too = match shown {
+            Shown::Period => "; red: period doubling, fold",
+            Shown::Exponent | Shown::YawRate => "",
+        };
+        let caption = format!("{}: {}{curves_too}", name(sheet), shown.name());
         let panel = Axes::new(&area, (&caption, ""), x, y);
         let colour = |cell: &Cell| match &scale {
             Some(scale) => shown
