@@ -109,7 +109,8 @@ pub(crate) fn largest_of<const K: usize>(
 
 /// Variance of the sum of a correlated sequence of mean zero: prewhitened by a first-order
 /// autoregression, then with Bartlett weights. D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992)
-/// 953. The lags are the length to the power 2/3: fewer miss the laminar phases of intermittent chaos.
+/// 953. The greater of two, with as many lags as the root of the length and as its power 2/3: the first
+/// misses the laminar phases of intermittent chaos, the second scatters more.
 fn long_run_variance_sum(sequence: &[f64]) -> f64 {
     let covariance =
         |x: &[f64], lag: usize| -> f64 { x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum() };
@@ -120,12 +121,15 @@ fn long_run_variance_sum(sequence: &[f64]) -> f64 {
     let rho =
         (covariance(sequence, 1) / variance).clamp(-GREATEST_CORRELATION, GREATEST_CORRELATION);
     let white: Vec<f64> = sequence.windows(2).map(|x| x[1] - rho * x[0]).collect();
-    let lags = (white.len() as f64).powf(2.0 / 3.0) as usize;
-    let weighted = (1..=lags).map(|lag| {
-        let weight = 1.0 - lag as f64 / (lags + 1) as f64;
-        2.0 * weight * covariance(&white, lag)
-    });
-    let sum = covariance(&white, 0) + weighted.sum::<f64>();
+    let with_lags = |power: f64| {
+        let lags = (white.len() as f64).powf(power) as usize;
+        let weighted = (1..=lags).map(|lag| {
+            let weight = 1.0 - lag as f64 / (lags + 1) as f64;
+            2.0 * weight * covariance(&white, lag)
+        });
+        covariance(&white, 0) + weighted.sum::<f64>()
+    };
+    let sum = with_lags(0.5).max(with_lags(2.0 / 3.0));
     sum.max(0.0) / (1.0 - rho).powi(2)
 }
 

@@ -10,6 +10,7 @@ use dynamics::{equilibria, sweep::mirrored};
 use nalgebra::Vector4;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
+use shared_model::ecu_schedule::Table;
 use shared_model::vehicle::Model;
 
 fn plan(coefficient: f64, rpm: f64, range: (f64, f64)) -> Plan {
@@ -213,6 +214,42 @@ fn a_trajectory_that_comes_to_rest_has_no_branch() {
         "{:?}",
         found.without_branch
     );
+}
+
+/// The greatest multiplier of the orbits of both initial states at the amplitude that the ECU's table has for
+/// a speed: 0.8 would be a perturbation that is halved in three cycles.
+#[test]
+fn the_ecus_amplitudes_keep_a_margin_from_every_bifurcation() {
+    let mut greatest: f64 = 0.0;
+    for waveform in [Waveform::Square, Waveform::Sine] {
+        let table = Table::<f64>::of(waveform);
+        for k in 0..8 {
+            let rpm = 1550.0 + 50.0 * f64::from(k);
+            let mut scenario = Scenario::reconstruction();
+            scenario.run.wheel_speed_rpm = rpm;
+            scenario.dither.waveform = waveform;
+            scenario.dither.amplitude_v = table.amplitude_v(rpm);
+            for start in [scenario, mirrored(&scenario)] {
+                let mut plan = plan(0.28, rpm, (rpm - 0.5, rpm + 0.5));
+                plan.scenario = start;
+                plan.transient_s = 300.0;
+                let found = bifurcations(&plan).unwrap();
+                let Some(branch) = found.orbits.first() else {
+                    continue; // at rest
+                };
+                assert!(
+                    found.specials.is_empty(),
+                    "{waveform:?} {rpm}: {:?}",
+                    found.specials
+                );
+                for orbit in &branch.points {
+                    let multiplier = orbit.multipliers[0];
+                    greatest = greatest.max(multiplier.re.hypot(multiplier.im));
+                }
+            }
+        }
+    }
+    assert!(greatest < 0.8, "{greatest}");
 }
 
 mod edges {
