@@ -174,10 +174,10 @@ impl Arguments {
             Waveform::Sine => (0.0, 1.4),
             Waveform::None | Waveform::Square => (0.0, 0.2),
         };
-        let default = match parameter.as_str() {
-            SPEED => Some((1500.0, 2000.0)),
-            AMPLITUDE => Some(amplitude),
-            _ => None,
+        let default = match Parameter::from_key(&parameter) {
+            Some(Parameter::Speed) => Some((1500.0, 2000.0)),
+            Some(Parameter::Amplitude) => Some(amplitude),
+            None => None,
         };
         let (from, to) = match (
             self.from.or(default.map(|d| d.0)),
@@ -194,7 +194,7 @@ impl Arguments {
         let names = std::iter::once(&parameter).chain(second.as_ref().map(|(key, _)| key));
         for name in names {
             ensure!(
-                name != AMPLITUDE || scenario.dither.waveform != Waveform::None,
+                name != Parameter::Amplitude.key() || scenario.dither.waveform != Waveform::None,
                 "--dither: must be square or sine, because the amplitude of no dither has no effect"
             );
         }
@@ -215,10 +215,12 @@ impl Arguments {
             );
         }
         // A range that does not contain the preset's value begins in its middle, unless a value is given.
-        let is_given = match parameter.as_str() {
-            SPEED => self.run.rpm.is_some() || self.run.config.config.is_some(),
-            AMPLITUDE => self.run.amplitude_v.is_some() || self.run.config.config.is_some(),
-            _ => self.run.config.config.is_some(),
+        let is_given = match Parameter::from_key(&parameter) {
+            Some(Parameter::Speed) => self.run.rpm.is_some() || self.run.config.config.is_some(),
+            Some(Parameter::Amplitude) => {
+                self.run.amplitude_v.is_some() || self.run.config.config.is_some()
+            }
+            None => self.run.config.config.is_some(),
         };
         if let Some(value) = scenario.number(&parameter)
             && !is_given
@@ -240,24 +242,20 @@ impl Arguments {
     }
 }
 
-const SPEED: &str = "run.wheel_speed_rpm";
-const AMPLITUDE: &str = "dither.amplitude_v";
-
 /// The configuration's name of a parameter.
 fn key(name: &str) -> String {
     match name {
-        "speed" => SPEED.into(),
-        "amplitude" => AMPLITUDE.into(),
+        "speed" => Parameter::Speed.key().into(),
+        "amplitude" => Parameter::Amplitude.key().into(),
         other => other.into(),
     }
 }
 
 /// Name with unit, for axes.
 fn axis(key: &str) -> String {
-    match key {
-        SPEED => Parameter::Speed.name().into(),
-        AMPLITUDE => Parameter::Amplitude.name().into(),
-        other => other.into(),
+    match Parameter::from_key(key) {
+        Some(parameter) => parameter.name().into(),
+        None => key.into(),
     }
 }
 
@@ -299,10 +297,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 
 /// The maxima of an orbit diagram over the same range, to be drawn below the branches.
 fn simulated(plan: &Plan) -> Vec<(f64, f64)> {
-    let parameter = match plan.parameter.as_str() {
-        SPEED => Parameter::Speed,
-        AMPLITUDE => Parameter::Amplitude,
-        _ => return Vec::new(),
+    let Some(parameter) = Parameter::from_key(&plan.parameter) else {
+        return Vec::new();
     };
     let at = |scenario: &Scenario<f64>| {
         let (from, to) = plan.range;

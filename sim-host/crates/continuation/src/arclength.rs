@@ -235,8 +235,16 @@ pub struct Step<'a, P: Problem> {
     pub to: &'a Point<P::Solution>,
 }
 
+impl<P: Problem> Step<'_, P> {
+    /// Its length along the tangent, in the scales.
+    pub fn arclength(&self) -> f64 {
+        let moved = (&self.to.unknowns - &self.from.unknowns).component_div(self.problem.scales());
+        moved.dot(&self.from.tangent)
+    }
+}
+
 /// Follows the curve through the point near `guess` along `tangent`. `parameters` are the indices of the
-/// parameters among the unknowns. Each step is shown to `see`, which may end the curve.
+/// parameters among the unknowns. `visit` is called with each step, and may end the curve.
 ///
 /// # Errors
 /// If there is no point near the guess.
@@ -246,10 +254,10 @@ pub fn walk<P: Problem>(
     tangent: &DVector<f64>,
     parameters: &[usize],
     settings: &Settings,
-    mut see: impl FnMut(Step<'_, P>) -> Option<End>,
+    mut visit: impl FnMut(Step<'_, P>) -> Option<End>,
 ) -> Result<End, Failure> {
     let mut point = correct(&problem, guess, tangent)?;
-    if let Some(end) = see(Step {
+    if let Some(end) = visit(Step {
         problem: &problem,
         from: &point,
         to: &point,
@@ -262,8 +270,8 @@ pub fn walk<P: Problem>(
             Ok(rebased) => rebased,
             Err(failure) => return Ok(End::Failed(failure)),
         };
-        let (mut next, at_end) = match advance(&problem, &point, &mut step, settings) {
-            Ok(next) => (next, false),
+        let mut next = match advance(&problem, &point, &mut step, settings) {
+            Ok(next) => next,
             Err(failure) => return Ok(End::Failed(failure)),
         };
         let outside = parameters
@@ -273,17 +281,15 @@ pub fn walk<P: Problem>(
                 let value = next.unknowns[index];
                 (!(low..=high).contains(&value)).then(|| (index, value.clamp(low, high)))
             });
-        let mut at_end = at_end;
         if let Some((index, bound)) = outside {
-            at_end = true;
             next = at_bound(&problem, &point, &next, index, bound).unwrap_or(next);
         }
-        let end = see(Step {
+        let end = visit(Step {
             problem: &problem,
             from: &point,
             to: &next,
         });
-        if end.is_some() || at_end {
+        if end.is_some() || outside.is_some() {
             return Ok(end.unwrap_or(End::Range));
         }
         point = next;

@@ -13,7 +13,7 @@ const LOOSER: f64 = 100.0;
 const ON_CIRCLE: f64 = 1e-3;
 /// An orbit of less than this extent, as a share of that of the first one, is at its end at an
 /// equilibrium.
-const VANISHED: f64 = 0.02;
+pub(crate) const VANISHED: f64 = 0.02;
 /// A period of more than this many first ones has no end.
 const LONGEST_PERIOD: f64 = 50.0;
 /// Orbits before a branch may be closed.
@@ -44,8 +44,8 @@ pub struct Branch<M, const N: usize> {
 
 type At<S, const N: usize> = Point<Orbit<<S as System<N>>::Mode, N>>;
 
-/// The branch through the orbit near `guess`, along `tangent` at first. Every orbit is shown to `see`,
-/// which stops the branch by returning false.
+/// The branch through the orbit near `guess`, along `tangent` at first. `visit` is called with every
+/// orbit, and stops the branch by returning false.
 ///
 /// # Errors
 /// If there is no orbit near the guess.
@@ -54,7 +54,7 @@ pub fn follow<S: System<N>, const N: usize, const K: usize>(
     guess: DVector<f64>,
     tangent: &DVector<f64>,
     settings: &Settings,
-    mut see: impl FnMut(&Orbit<S::Mode, N>) -> bool,
+    mut visit: impl FnMut(&Orbit<S::Mode, N>) -> bool,
 ) -> Result<Branch<S::Mode, N>, Failure> {
     let mut branch = Branch {
         orbits: Vec::new(),
@@ -77,7 +77,7 @@ pub fn follow<S: System<N>, const N: usize, const K: usize>(
                 }
             }
             branch.orbits.push(orbit.clone());
-            if !see(orbit) {
+            if !visit(orbit) {
                 return Some(End::Stopped);
             }
             let first = &branch.orbits[0];
@@ -157,9 +157,7 @@ fn special<S: System<N>, const N: usize, const K: usize>(
 ) -> Option<Special<S::Mode, N>> {
     let (problem, from) = (step.problem, step.from);
     let scales = problem.scales();
-    let arclength = (&step.to.unknowns - &from.unknowns)
-        .component_div(scales)
-        .dot(&from.tangent);
+    let arclength = step.arclength();
     let index = problem.parameter_index();
     let test = |point: &At<S, N>| match kind {
         // Along the branch the parameter turns back.

@@ -1,6 +1,7 @@
 //! Curves of bifurcations in two parameters: the equations of a solution, and its test function.
 
 use crate::arclength::{End, Evaluation, Point, Problem, Settings, walk};
+use crate::branch::VANISHED;
 use crate::equilibrium::{Equilibria, Equilibrium};
 use crate::failure::Failure;
 use crate::orbit::{Orbit, Shooting};
@@ -94,7 +95,6 @@ pub fn of_orbits<S: System<N>, const N: usize, const K: usize>(
     orbit: &Orbit<S::Mode, N>,
     sign: f64,
     settings: &Settings,
-    mut see: impl FnMut(&Orbit<S::Mode, N>) -> bool,
 ) -> Result<Curve<Orbit<S::Mode, N>>, Failure> {
     let inner = problem.at_orbit(orbit, &settings.spans())?;
     let guess = inner.guess(orbit.start(), orbit.period_s, orbit.parameters)?;
@@ -116,10 +116,7 @@ pub fn of_orbits<S: System<N>, const N: usize, const K: usize>(
         |step| {
             let orbit = &step.to.solution;
             curve.points.push(orbit.clone());
-            if !see(orbit) {
-                return Some(End::Stopped);
-            }
-            (orbit.size() < 0.02 * size).then_some(End::Equilibrium)
+            (orbit.size() < VANISHED * size).then_some(End::Equilibrium)
         },
     )?;
     Ok(curve)

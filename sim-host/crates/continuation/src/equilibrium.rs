@@ -1,11 +1,10 @@
 //! Equilibria over one parameter or two, and Hopf bifurcations with their criticality.
 
-use crate::arclength::{
-    End, Evaluation, Function, Point, Problem, Settings, Step, correct, locate, walk,
-};
+use crate::arclength::{End, Evaluation, Function, Point, Problem, Settings, Step, locate, walk};
 use crate::failure::Failure;
 use crate::system::{Equations, Parameters, System};
 use crate::test_function::sums_of_pairs;
+use crate::trajectory::seed;
 use engine::dual::Dual;
 use nalgebra::{Complex, DMatrix, DVector, SMatrix, SVector};
 
@@ -109,10 +108,11 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Equilibria<'a, S, N, K> {
         axis
     }
 
-    /// The same equations with this many unknown parameters.
-    fn with_free(&self, parameters: Parameters<f64>, spans: &[f64]) -> Self {
-        let sizes = self.scales.fixed_rows::<N>(0).into_owned();
-        Self::new(self.system, self.mode, &sizes, parameters, spans)
+    /// A matrix in the scales.
+    fn scaled(&self, matrix: &SMatrix<f64, N, N>) -> DMatrix<Complex<f64>> {
+        DMatrix::from_fn(N, N, |i, k| {
+            Complex::new(matrix[(i, k)] * self.scales[k] / self.scales[i], 0.0)
+        })
     }
 
     fn jacobian(&self, x: &SVector<f64, N>, parameters: Parameters<f64>) -> SMatrix<f64, N, N> {
@@ -121,12 +121,6 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Equilibria<'a, S, N, K> {
     }
 
     fn rates(&self, x: &SVector<f64, N>, parameters: Parameters<f64>) -> SVector<Dual<K>, N> {
-        let seed = |value, place| {
-            Dual::new(
-                value,
-                std::array::from_fn(|k| f64::from(u8::from(k == place))),
-            )
-        };
         let equations = self
             .system
             .equations(std::array::from_fn(|k| seed(parameters[k], N + k)));
@@ -140,13 +134,7 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Equilibria<'a, S, N, K> {
     pub fn first_lyapunov_coefficient(&self, at: &Equilibrium<N>) -> Option<f64> {
         let omega = at.leading_pair()?.im;
         let i_omega = Complex::new(0.0, omega);
-        let complex = |matrix: &SMatrix<f64, N, N>| {
-            DMatrix::from_fn(N, N, |i, k| {
-                // In the scales.
-                Complex::new(matrix[(i, k)] * self.scales[k] / self.scales[i], 0.0)
-            })
-        };
-        let jacobian = complex(&at.jacobian);
+        let jacobian = self.scaled(&at.jacobian);
         let identity = DMatrix::<Complex<f64>>::identity(N, N);
         let q = null_vector(&jacobian - &identity * i_omega)?;
         let p = null_vector(jacobian.transpose() + &identity * i_omega)?;
@@ -159,7 +147,7 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Equilibria<'a, S, N, K> {
                     x[i] += sign * DISPLACEMENT * vector[i] * self.scales[i];
                 }
             }
-            complex(&self.jacobian(&x, at.parameters))
+            self.scaled(&self.jacobian(&x, at.parameters))
         };
         let second = |u: &DVector<f64>, v: &DVector<Complex<f64>>| {
             (displaced(&[(u, 1.0)]) - displaced(&[(u, -1.0)])) * v
@@ -195,9 +183,7 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Equilibria<'a, S, N, K> {
         amplitude: f64,
     ) -> Option<(SVector<f64, N>, f64)> {
         let omega = at.leading_pair()?.im;
-        let scaled = DMatrix::from_fn(N, N, |i, k| {
-            Complex::new(at.jacobian[(i, k)] * self.scales[k] / self.scales[i], 0.0)
-        });
+        let scaled = self.scaled(&at.jacobian);
         let q = null_vector(scaled - DMatrix::identity(N, N) * Complex::new(0.0, omega))?;
         let displacement = SVector::from_fn(|i, _| amplitude * q[i].re * self.scales[i]);
         Some((displacement, std::f64::consts::TAU / omega))
@@ -261,8 +247,6 @@ pub struct Hopf<const N: usize> {
     pub frequency_rad_per_s: f64,
     /// First Lyapunov coefficient; negative where the orbit is stable.
     pub first_lyapunov_coefficient: f64,
-    /// Number of the branch's point before it.
-    pub after: usize,
 }
 
 /// A branch of equilibria.
@@ -298,7 +282,7 @@ pub fn follow<S: System<N>, const N: usize, const K: usize>(
     let axis = problem.parameter_axis(sign);
     branch.end = walk(problem.clone(), guess, &axis, &[N], settings, |step| {
         if !branch.equilibria.is_empty() {
-            branch.hopf.extend(hopf(&step, branch.equilibria.len() - 1));
+            branch.hopf.extend(hopf(&step));
             branch.folds.extend(fold(&step));
         }
         branch.equilibria.push(step.to.solution.clone());
@@ -307,22 +291,11 @@ pub fn follow<S: System<N>, const N: usize, const K: usize>(
     Ok(branch)
 }
 
-fn arclength<P: Problem>(step: &Step<'_, P>) -> f64 {
-    let moved = (&step.to.unknowns - &step.from.unknowns).component_div(step.problem.scales());
-    moved.dot(&step.from.tangent)
-}
-
 fn hopf<S: System<N>, const N: usize, const K: usize>(
     step: &Step<'_, Equilibria<'_, S, N, K>>,
-    after: usize,
 ) -> Option<Hopf<N>> {
     let test = |point: &Point<Equilibrium<N>>| point.solution.hopf_test();
-    let (point, _) = locate(
-        step.problem,
-        step.from,
-        arclength(step),
-        &Function::Smooth(&test),
-    )?;
+    let (point, _) = located(step, &test)?;
     let at = point.solution;
     let pair = at.leading_pair()?;
     if pair.re.abs() > ON_AXIS * pair.im {
@@ -333,7 +306,6 @@ fn hopf<S: System<N>, const N: usize, const K: usize>(
         frequency_rad_per_s: pair.im,
         first_lyapunov_coefficient: step.problem.first_lyapunov_coefficient(&at)?,
         at,
-        after,
     })
 }
 
@@ -341,25 +313,19 @@ fn fold<S: System<N>, const N: usize, const K: usize>(
     step: &Step<'_, Equilibria<'_, S, N, K>>,
 ) -> Option<Equilibrium<N>> {
     let test = |point: &Point<Equilibrium<N>>| point.tangent[N];
-    let (point, _) = locate(
-        step.problem,
-        step.from,
-        arclength(step),
-        &Function::Smooth(&test),
-    )?;
+    let (point, _) = located(step, &test)?;
     Some(point.solution)
 }
 
-/// The equilibrium near `guess` at its parameters.
-///
-/// # Errors
-/// If there is none.
-pub fn equilibrium_at<S: System<N>, const N: usize, const K: usize>(
-    problem: &Equilibria<'_, S, N, K>,
-    guess: &SVector<f64, N>,
-    parameters: Parameters<f64>,
-) -> Result<Equilibrium<N>, Failure> {
-    let problem = problem.with_free(parameters, &[1.0]);
-    let guess = problem.unknowns(guess, parameters);
-    Ok(correct(&problem, guess, &problem.parameter_axis(1.0))?.solution)
+/// The zero of a function in a step.
+fn located<P: Problem>(
+    step: &Step<'_, P>,
+    test: &dyn Fn(&Point<P::Solution>) -> f64,
+) -> Option<(Point<P::Solution>, f64)> {
+    locate(
+        step.problem,
+        step.from,
+        step.arclength(),
+        &Function::Smooth(test),
+    )
 }

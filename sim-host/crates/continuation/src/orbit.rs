@@ -8,7 +8,7 @@
 use crate::arclength::{Evaluation, Point, Problem};
 use crate::failure::Failure;
 use crate::system::{Equations, Parameters, System};
-use crate::trajectory::{Trajectory, differentiate, integrate};
+use crate::trajectory::{Trajectory, differentiate, integrate, seed};
 use engine::dual::Dual;
 use nalgebra::{Complex, DMatrix, DVector, SMatrix, SVector};
 
@@ -297,7 +297,7 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
     }
 
     fn dual_parameters(&self, parameters: Parameters<f64>) -> Parameters<Dual<K>> {
-        std::array::from_fn(|k| unit(parameters[k], N + k))
+        std::array::from_fn(|k| seed(parameters[k], N + k))
     }
 
     fn seeds(
@@ -305,7 +305,7 @@ impl<'a, S: System<N>, const N: usize, const K: usize> Shooting<'a, S, N, K> {
         start: &SVector<f64, N>,
         parameters: Parameters<f64>,
     ) -> (Parameters<Dual<K>>, SVector<Dual<K>, N>) {
-        let seeds = SVector::from_fn(|i, _| unit(start[i], i));
+        let seeds = SVector::from_fn(|i, _| seed(start[i], i));
         (self.dual_parameters(parameters), seeds)
     }
 
@@ -467,13 +467,6 @@ impl<S: System<N>, const N: usize, const K: usize> Problem for Shooting<'_, S, N
 fn sizes<const N: usize>(extent: &SVector<f64, N>) -> SVector<f64, N> {
     let least = extent.amax() * 1e-3;
     extent.map(|extent| extent.max(least))
-}
-
-fn unit<const K: usize>(value: f64, place: usize) -> Dual<K> {
-    Dual::new(
-        value,
-        std::array::from_fn(|k| f64::from(u8::from(k == place))),
-    )
 }
 
 /// The direction that a singular matrix takes to zero, nearly.

@@ -73,10 +73,26 @@ pub fn near_returns<S: System<N>, const N: usize>(
     }
     let level = 0.5 * (low[component] + high[component]);
     let crossings = rises(system, parameters, &observed, component, level, tolerance);
+    let found = returns(&crossings, &extent, parameters, most_cycles);
+    match found.is_empty() {
+        true => Err(Failure::NoReturn {
+            longest_s: observed_s,
+        }),
+        false => Ok(found),
+    }
+}
+
+/// The nearest return among crossings of a section (time in s, state) after each number of cycles, by
+/// distances as shares of `extent`.
+pub fn returns<const N: usize>(
+    crossings: &[(f64, SVector<f64, N>)],
+    extent: &SVector<f64, N>,
+    parameters: Parameters<f64>,
+    most_cycles: usize,
+) -> Vec<NearReturn<N>> {
     let least = 1e-3 * extent.amax();
     let size = extent.map(|extent| extent.max(least));
-    let mut found = Vec::new();
-    for cycles in 1..=most_cycles.min(crossings.len().saturating_sub(1)) {
+    let nearest = |cycles: usize| {
         let pairs = crossings.iter().zip(&crossings[cycles..]);
         let returns = pairs.map(|(from, to)| NearReturn {
             guess: Guess {
@@ -87,14 +103,10 @@ pub fn near_returns<S: System<N>, const N: usize>(
             cycles,
             distance: (to.1 - from.1).component_div(&size).amax(),
         });
-        found.extend(returns.min_by(|a, b| a.distance.total_cmp(&b.distance)));
-    }
-    if found.is_empty() {
-        return Err(Failure::NoReturn {
-            longest_s: observed_s,
-        });
-    }
-    Ok(found)
+        returns.min_by(|a, b| a.distance.total_cmp(&b.distance))
+    };
+    let most = most_cycles.min(crossings.len().saturating_sub(1));
+    (1..=most).filter_map(nearest).collect()
 }
 
 /// Where a trajectory's component rises through a level, unless its mode confines it there: time, s, and

@@ -91,11 +91,13 @@ impl<M: Copy + PartialEq, const N: usize> Trajectory<M, N> {
     }
 }
 
-/// A margin and its rate of change along the trajectory.
-#[derive(Debug, Clone, Copy)]
-struct Margin {
-    value: f64,
-    rate_per_s: f64,
+/// A quantity and its rate of change along the trajectory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// The quantity.
+    pub value: f64,
+    /// Its rate, per second.
+    pub rate_per_s: f64,
 }
 
 /// The integrator of a system at one pair of parameters.
@@ -216,10 +218,10 @@ impl<S: System<N>, const N: usize> Integrator<'_, S, N> {
         }
     }
 
-    fn margins(&self, x: &SVector<f64, N>, mode: S::Mode) -> [Margin; 2] {
+    fn margins(&self, x: &SVector<f64, N>, mode: S::Mode) -> [Sample; 2] {
         let rates = self.equations.derivative(x, mode);
         let along = SVector::from_fn(|i, _| Dual::new(x[i], [rates[i]]));
-        let margin = |margin: Dual<1>| Margin {
+        let margin = |margin: Dual<1>| Sample {
             value: margin.value,
             rate_per_s: margin.tangent[0],
         };
@@ -252,8 +254,8 @@ impl<S: System<N>, const N: usize> Integrator<'_, S, N> {
         mode: S::Mode,
         margin: usize,
         step_s: f64,
-        before: Margin,
-        after: Margin,
+        before: Sample,
+        after: Sample,
     ) -> Option<f64> {
         if before.value == f64::INFINITY {
             return None;
@@ -284,11 +286,11 @@ impl<S: System<N>, const N: usize> Integrator<'_, S, N> {
 
 /// The instant at which a margin falls below zero, between the start of a step and `high_s`.
 fn root(
-    before: Margin,
+    before: Sample,
     step_s: f64,
     mut high_s: f64,
     at: impl Fn(f64) -> f64,
-    exact: impl Fn(f64) -> Margin,
+    exact: impl Fn(f64) -> Sample,
 ) -> f64 {
     // A margin that begins at zero has left it first.
     let mut low_s = 0.0;
@@ -336,8 +338,8 @@ fn root(
     instant_s
 }
 
-/// A margin's cubic at a share of the step.
-fn hermite(before: Margin, after: Margin, step_s: f64, share: f64) -> f64 {
+/// The cubic with the values and rates at both ends of a step, at a share of it.
+pub fn hermite(before: Sample, after: Sample, step_s: f64, share: f64) -> f64 {
     let rest = 1.0 - share;
     before.value * rest * rest * (1.0 + 2.0 * share)
         + before.rate_per_s * step_s * rest * rest * share
@@ -386,6 +388,14 @@ where
     (row[COLUMNS - 1], error)
 }
 
+/// A number that is the independent variable in that place.
+pub(crate) fn seed<const K: usize>(value: f64, place: usize) -> Dual<K> {
+    Dual::new(
+        value,
+        std::array::from_fn(|k| f64::from(u8::from(k == place))),
+    )
+}
+
 /// The end of a trajectory with derivatives: repeats its first `legs` steps with a `start` and
 /// `equations` in dual numbers, at fixed times.
 ///
@@ -410,14 +420,14 @@ where
         time_s += leg.step_s;
         let Some(passed) = leg.passes else { continue };
         let next = trajectory.legs.get(k + 1).map(|leg| leg.mode);
-        x = salt(equations, x, leg.mode, passed, next).ok_or(Failure::Grazes { time_s })?;
+        x = saltation(equations, x, leg.mode, passed, next).ok_or(Failure::Grazes { time_s })?;
     }
     Ok(x)
 }
 
 /// The tangent vectors after a mode's end: those at the boundary, less what the next mode has moved
 /// until the fixed time.
-fn salt<E: Equations<Dual<K>, N>, const N: usize, const K: usize>(
+fn saltation<E: Equations<Dual<K>, N>, const N: usize, const K: usize>(
     equations: &E,
     mut x: SVector<Dual<K>, N>,
     mode: E::Mode,

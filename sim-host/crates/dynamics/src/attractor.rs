@@ -115,6 +115,14 @@ impl Attractor {
     fn ending_early(early: EarlyEnd, end: &State<f64>) -> Self {
         let kind = Kind::from(early);
         Self {
+            diverges_at_s: (kind == Kind::Diverges).then_some(early.time_s),
+            ..Self::at(kind, end.x.into())
+        }
+    }
+
+    /// In one state.
+    fn at(kind: Kind, state: [f64; 4]) -> Self {
+        Self {
             kind,
             residual: None,
             cycle_s: None,
@@ -122,10 +130,10 @@ impl Attractor {
             exponent_per_s: None,
             exponent_threshold_per_s: None,
             maxima_rad_per_s: Vec::new(),
-            lower: end.x.into(),
-            upper: end.x.into(),
-            end: end.x.into(),
-            diverges_at_s: (kind == Kind::Diverges).then_some(early.time_s),
+            lower: state,
+            upper: state,
+            end: state,
+            diverges_at_s: None,
         }
     }
 
@@ -184,21 +192,7 @@ impl Attractor {
                 self.maxima_rad_per_s = orbit.prominent_maxima_rad_per_s;
                 self.end = orbit.state;
             }
-            Some(Settled::Equilibrium(state)) => {
-                self = Self {
-                    kind: Kind::Equilibrium,
-                    residual: None,
-                    cycle_s: None,
-                    cycles: None,
-                    exponent_per_s: None,
-                    exponent_threshold_per_s: None,
-                    maxima_rad_per_s: Vec::new(),
-                    lower: state,
-                    upper: state,
-                    end: state,
-                    diverges_at_s: None,
-                };
-            }
+            Some(Settled::Equilibrium(state)) => self = Self::at(Kind::Equilibrium, state),
             // It alternates, but leaves the orbit beside it.
             None => self.kind = Kind::Undecided,
         }

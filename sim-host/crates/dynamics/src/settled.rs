@@ -13,7 +13,7 @@ use continuation::Bifurcation;
 use continuation::arclength::Settings;
 use continuation::branch::{Special, follow, orbit_at};
 use continuation::orbit::{Orbit, Shooting};
-use continuation::start::{Search, near_returns, rises};
+use continuation::start::{returns, rises};
 use continuation::trajectory::integrate;
 use continuation::vehicle::Vehicle;
 use nalgebra::Vector4;
@@ -96,9 +96,8 @@ pub(crate) fn end_of_orbit(
 /// A trajectory, to be compared with what is beside it.
 struct Compared<'a> {
     vehicle: &'a Vehicle,
-    search: Search<4>,
-    /// Its rises of the yaw rate through the middle of its range.
-    crossings: Vec<Vector4<f64>>,
+    /// Its rises of the yaw rate through the middle of its range: time, s, and state.
+    crossings: Vec<(f64, Vector4<f64>)>,
     level: f64,
     extent: Vector4<f64>,
 }
@@ -114,15 +113,7 @@ impl<'a> Compared<'a> {
         let crossings = rises(vehicle, parameters, &trajectory, YAW_RATE, level, tolerance);
         Some(Self {
             vehicle,
-            search: Search {
-                start,
-                transient_s: 0.0,
-                observed_s: COMPARED_S,
-                component: YAW_RATE,
-                most_cycles: MOST_CYCLES,
-                tolerance,
-            },
-            crossings: crossings.into_iter().map(|(_, x)| x).collect(),
+            crossings,
             level,
             extent: high - low,
         })
@@ -130,9 +121,9 @@ impl<'a> Compared<'a> {
 
     /// Orbits beside it, by ascending number of cycles.
     fn orbits(&self) -> impl Iterator<Item = VehicleOrbit> {
-        let returns = near_returns(self.vehicle, self.vehicle.parameters(), &self.search);
-        let returns = returns.unwrap_or_default().into_iter();
-        returns
+        let parameters = self.vehicle.parameters();
+        returns(&self.crossings, &self.extent, parameters, MOST_CYCLES)
+            .into_iter()
             .filter(|found| found.distance < FARTHEST)
             .filter_map(|found| {
                 let guess = found.guess;
@@ -170,7 +161,7 @@ impl<'a> Compared<'a> {
             self.level,
             tolerance,
         );
-        let distance = |x: &Vector4<f64>| {
+        let distance = |(_, x): &(f64, Vector4<f64>)| {
             let apart = own
                 .iter()
                 .map(|(_, other)| (x - other).component_div(&self.extent).amax());
@@ -180,7 +171,7 @@ impl<'a> Compared<'a> {
         if quarter == 0 || own.is_empty() {
             return false;
         }
-        let greatest = |of: &[Vector4<f64>]| of.iter().map(distance).fold(0.0, f64::max);
+        let greatest = |of: &[(f64, Vector4<f64>)]| of.iter().map(distance).fold(0.0, f64::max);
         let first = greatest(&self.crossings[..quarter]);
         let last = greatest(&self.crossings[self.crossings.len() - quarter..]);
         last < ON_ORBIT || (last < first && last < FARTHEST)
@@ -188,7 +179,7 @@ impl<'a> Compared<'a> {
 
     /// The stable equilibrium that a spiral shrinks to.
     fn equilibrium(&self, scenario: &Scenario<f64>) -> Option<[f64; 4]> {
-        let (first, last) = (self.crossings.first()?, self.crossings.last()?);
+        let (first, last) = (&self.crossings.first()?.1, &self.crossings.last()?.1);
         let all = equilibria::find(scenario).ok()?;
         let apart = |x: &Vector4<f64>, state: &[f64; 4]| (x - Vector4::from(*state)).norm();
         let nearest = all

@@ -38,6 +38,13 @@ impl Parameter {
         }
     }
 
+    /// The parameter of that name in a configuration file.
+    pub fn from_key(key: &str) -> Option<Self> {
+        [Self::Speed, Self::Amplitude]
+            .into_iter()
+            .find(|parameter| parameter.key() == key)
+    }
+
     /// Name with unit, as axes and messages show it.
     pub fn name(self) -> &'static str {
         match self {

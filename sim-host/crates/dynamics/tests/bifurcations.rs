@@ -157,19 +157,30 @@ fn the_curve_of_a_doubling_meets_the_branches_at_its_points() {
     );
 }
 
+/// The equations are odd: with the motor's torque and the initial state of the other sign there is the same
+/// branch.
 #[test]
-fn the_other_lobe_has_the_mirrored_branch_where_the_motor_does_nothing() {
-    let mut given = plan(0.28, 1600.0, (1590.0, 1610.0));
-    given.scenario.steering.motor_current_a = 0.0;
+fn the_mirrored_vehicle_has_the_same_branch() {
+    let given = plan(0.28, 1600.0, (1590.0, 1610.0));
     let mut other = given.clone();
     other.scenario = mirrored(&given.scenario);
+    other.scenario.steering.motor_current_a *= -1.0;
     let [given, other] = [given, other].map(|plan| bifurcations(&plan).unwrap());
-    let period_s =
-        |found: &Bifurcations| found.orbits.first().map(|branch| branch.points[0].period_s);
-    match (period_s(&given), period_s(&other)) {
-        (Some(given), Some(other)) => assert!((given - other).abs() < 1e-8),
-        (given, other) => assert_eq!(given, other),
-    }
+    let first = |found: &Bifurcations| {
+        let point = &found.orbits[0].points[0];
+        (
+            point.period_s,
+            point.multipliers[0].re,
+            point.yaw_rate_max_rad_per_s,
+        )
+    };
+    let least = |found: &Bifurcations| found.orbits[0].points[0].yaw_rate_min_rad_per_s;
+    let (a, b) = (first(&given), first(&other));
+    assert!(
+        (a.0 - b.0).abs() < 1e-8 && (a.1 - b.1).abs() < 1e-6,
+        "{a:?} {b:?}"
+    );
+    assert!((a.2 + least(&other)).abs() < 1e-3, "{a:?} {b:?}");
 }
 
 #[test]
@@ -249,7 +260,7 @@ fn the_ecus_amplitudes_keep_a_margin_from_every_bifurcation() {
             }
         }
     }
-    assert!(greatest < 0.8, "{greatest}");
+    assert!((0.1..0.8).contains(&greatest), "{greatest}");
 }
 
 mod edges {

@@ -392,7 +392,7 @@ impl<'a> Work<'a> {
         let unknowns = problem.guess(&guess.start, guess.period_s, guess.parameters)?;
         let follow = |sign| {
             let axis = problem.parameter_axis(sign);
-            branch::follow(&problem, unknowns.clone(), &axis, &self.settings, going_on)
+            branch::follow(&problem, unknowns.clone(), &axis, &self.settings, |_| true)
         };
         let (down, up) = (follow(-1.0)?, follow(1.0)?);
         let points = down.orbits.iter().skip(1).rev().chain(&up.orbits);
@@ -479,7 +479,7 @@ impl<'a> Work<'a> {
         tangent: &DVector<f64>,
         depth: usize,
     ) -> Result<(), Failure> {
-        let branch = branch::follow(problem, guess, tangent, &self.settings, going_on)?;
+        let branch = branch::follow(problem, guess, tangent, &self.settings, |_| true)?;
         let points: Vec<_> = branch
             .orbits
             .iter()
@@ -588,7 +588,7 @@ impl<'a> Work<'a> {
             }
             let follow = |sign| {
                 let problem = self.problem_at(&vehicle, &orbit)?;
-                curve::of_orbits(&problem, kind, &orbit, sign, &settings, going_on)
+                curve::of_orbits(&problem, kind, &orbit, sign, &settings)
             };
             let sides = [follow(-1.0), follow(1.0)];
             self.keep_curve(kind.name(), sides, CurvePoint::of_orbit);
@@ -644,10 +644,6 @@ impl<'a> Work<'a> {
         }
         self.found.curves.push(Curve { kind, points, ends });
     }
-}
-
-fn going_on<T>(_: &T) -> bool {
-    true
 }
 
 fn check_range(key: &str, (from, to): (f64, f64)) -> Result<(), BifurcationsError> {

@@ -6,6 +6,7 @@ use continuation::branch::Special;
 use continuation::equilibrium::{Equilibrium, Hopf};
 use continuation::orbit::Orbit;
 use continuation::system::{Equations, System};
+use continuation::trajectory::{Sample, hermite};
 use continuation::vehicle::Vehicle;
 use engine::dual::Dual;
 use nalgebra::{Complex, Vector4};
@@ -111,7 +112,10 @@ fn extrema(vehicle: &Vehicle, orbit: &Vehicles) -> Vec<Extremum> {
         let rates = equations.derivative(&still, mode).map(|rate| rate.value);
         let moving = Vector4::from_fn(|i, _| Dual::new(x[i], [rates[i]]));
         let second = equations.derivative(&moving, mode)[YAW_RATE];
-        (second.value, second.tangent[0])
+        Sample {
+            value: second.value,
+            rate_per_s: second.tangent[0],
+        }
     };
     let mut found = Vec::new();
     for segment in &orbit.segments {
@@ -119,13 +123,7 @@ fn extrema(vehicle: &Vehicle, orbit: &Vehicles) -> Vec<Extremum> {
             let step_s = leg.step_s;
             let (from, to) = (slope(&pair[0], leg.mode), slope(&pair[1], leg.mode));
             let (first, last) = (pair[0][YAW_RATE], pair[1][YAW_RATE]);
-            let at = |share: f64| {
-                let rest = 1.0 - share;
-                from.0 * rest * rest * (1.0 + 2.0 * share)
-                    + from.1 * step_s * rest * rest * share
-                    + to.0 * share * share * (1.0 + 2.0 * rest)
-                    - to.1 * step_s * share * share * rest
-            };
+            let at = |share: f64| hermite(from, to, step_s, share);
             // The quartic that has this cubic as its slope, by Simpson's rule.
             let height = |share: f64| {
                 let area = |from: f64, to: f64| {
