@@ -616,3 +616,24 @@ fn a_state_at_rest_or_on_its_way_is_refused() {
         Some(continuation::Failure::Diverges { .. })
     ));
 }
+
+/// z' = (mu + i) z + 2 nu |z|^2 z along the eigenvector of length 1, so that the coefficient is 2 nu.
+#[test]
+fn the_first_lyapunov_coefficient_of_a_radial_system() {
+    for nu in [-1.0, 1.0] {
+        let parameters = [-0.1, nu];
+        let settings = Settings::over(&[(-0.2, 0.2)]);
+        let sizes = Vector2::new(1.0, 1.0);
+        let spans = settings.spans();
+        let problem = Equilibria::<_, 2, 4>::new(&Radial::PLAIN, (), &sizes, parameters, &spans);
+        let guess = problem.unknowns(&Vector2::zeros(), parameters);
+        let branch = equilibrium::follow(&problem, guess, 1.0, &settings).unwrap();
+        let [hopf] = &branch.hopf[..] else {
+            panic!("{:?}", branch.hopf)
+        };
+        assert!(hopf.at.parameters[0].abs() < 1e-12);
+        // The fifth power adds to the differences of the third derivative.
+        let coefficient = hopf.first_lyapunov_coefficient;
+        assert!((coefficient - 2.0 * nu).abs() < 1e-5, "{coefficient}");
+    }
+}
