@@ -3,7 +3,7 @@
 use crate::board::{Board, Current};
 use crate::nvic;
 use core::cell::Cell;
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 use critical_section::Mutex;
 use heapless::spsc::{Consumer, Producer, Queue};
 use shared_model::bus::{Busy, SerialBus, SerialLine};
@@ -11,9 +11,11 @@ use shared_model::bus::{Busy, SerialBus, SerialLine};
 /// The bus.
 pub type ProductBus = SerialBus<Uart>;
 
-/// Received bytes on their way: 1.3 ms of a full line of 1 Mbit/s. No more are taken in a control tick:
-/// the interrupt is above the tasks, and a line that babbles must not have their time.
+/// Received bytes on their way: 1.3 ms of a full line of 1 Mbit/s.
 const RECEIVE_RING: usize = 128;
+/// Bytes that the interrupt takes at most from one control tick to the next: it is above the tasks, and a
+/// line that babbles must not have their time. Three packets.
+const BYTES_PER_TICK: u32 = 96;
 /// Bytes to send: four packets.
 const SEND_RING: usize = 128;
 /// Bytes that one interrupt takes at most: more than a packet.
@@ -28,8 +30,8 @@ struct Ends {
     to_send: Consumer<'static, u8, SEND_RING>,
 }
 
-/// The ring was full, and the interrupt on bytes is off until it has been emptied.
-static IS_FULL: AtomicBool = AtomicBool::new(false);
+/// Bytes that the interrupt may still take. At 0 it is off until the control task has emptied the ring.
+static BYTES_LEFT: AtomicU32 = AtomicU32::new(BYTES_PER_TICK);
 static ENDS: Mutex<Cell<Option<Ends>>> = Mutex::new(Cell::new(None));
 
 /// The control task's end of the line.
@@ -70,15 +72,16 @@ impl Ends {
     fn work(&mut self) {
         Current::uart_acknowledge();
         for _ in 0..BYTES_PER_INTERRUPT {
-            if !self.received.ready() {
-                // Bytes without room are lost, and their packets with them.
+            let left = BYTES_LEFT.load(Ordering::Relaxed);
+            if left == 0 {
+                // Bytes that come now are lost, and their packets with them.
                 Current::uart_interrupt_on_byte(false);
-                IS_FULL.store(true, Ordering::Relaxed);
                 break;
             }
             let Some(byte) = Current::uart_receive() else {
                 break;
             };
+            BYTES_LEFT.store(left - 1, Ordering::Relaxed);
             let _ = self.received.enqueue(byte);
         }
         for _ in 0..SEND_RING {
@@ -97,11 +100,19 @@ impl Ends {
 impl SerialLine for Uart {
     fn receive(&mut self) -> Option<u8> {
         let byte = self.received.dequeue();
-        if byte.is_none() && IS_FULL.load(Ordering::Relaxed) {
-            IS_FULL.store(false, Ordering::Relaxed);
-            critical_section::with(|_| Current::uart_interrupt_on_byte(true));
-            // For a byte that came meanwhile.
-            nvic::pend(Current::UART_INTERRUPTS);
+        if byte.is_none() {
+            let was_off = critical_section::with(|_| {
+                let was_off = BYTES_LEFT.load(Ordering::Relaxed) == 0;
+                BYTES_LEFT.store(BYTES_PER_TICK, Ordering::Relaxed);
+                if was_off {
+                    Current::uart_interrupt_on_byte(true);
+                }
+                was_off
+            });
+            if was_off {
+                // For a byte that came meanwhile.
+                nvic::pend(Current::UART_INTERRUPTS);
+            }
         }
         byte
     }

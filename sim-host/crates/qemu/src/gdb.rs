@@ -286,8 +286,12 @@ impl Gdb {
         if from_hex(&String::from_utf8_lossy(&digits)) != Some(vec![checksum(&content)]) {
             return Err(SocketError::NotUnderstood(text));
         }
-        self.socket.write(b"+")?;
-        Ok(text)
+        match self.socket.write(b"+") {
+            // The stub closes the connection after the report of the program's end; if it has done so for
+            // another reason, the next request fails.
+            Ok(()) | Err(SocketError::Lost(_)) => Ok(text),
+            Err(error) => Err(error),
+        }
     }
 }
 
