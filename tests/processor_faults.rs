@@ -10,6 +10,7 @@ use pil::fault::row::Row;
 use pil::mil_sil_pil::Target;
 use qemu::Machine;
 use qemu::session::LinkKind;
+use rayon::prelude::*;
 use shared_model::frame::decode_actuation;
 use shared_model::signal::Mode;
 use std::collections::BTreeSet;
@@ -82,7 +83,7 @@ fn no_flipped_bit_is_undetected() {
     let flips = flips(&target().image, FLIPS, BENCH_TICKS);
     assert_eq!(flips.len(), FLIPS * Region::ALL.len());
     let rows: Vec<Row> = flips
-        .iter()
+        .par_iter()
         .map(|flip| {
             bench
                 .inject(*flip)

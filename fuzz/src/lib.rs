@@ -21,7 +21,6 @@ pub const TARGETS: &[Target] = &[
     runs::TELEMETRY,
     runs::RECORDING,
     maps::TILE,
-    maps::PARQUET,
     texts::CONFIGURATION,
     texts::MANOEUVRE,
     texts::RECORD,

@@ -1,9 +1,9 @@
-//! Files of a map: tiles, and the Parquet file that a schedule begins with.
+//! Tiles of a map.
 
-use crate::target::{Target, as_it_is};
+use crate::target::Target;
 use dynamics::map::cell::{Cell, cells};
 use dynamics::map::plan::{Grid, Plan, Sheet, Start};
-use dynamics::map::{table, tiles};
+use dynamics::map::tiles;
 use dynamics::sweep::Timing;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
@@ -22,17 +22,6 @@ pub const TILE: Target = Target {
     // Copies of the text, and a row of CSV as a cell.
     multiple: 24,
     mutations: 100_000,
-};
-
-/// A map as Parquet.
-pub const PARQUET: Target = Target {
-    name: "parquet",
-    read: read_parquet,
-    repair: as_it_is,
-    seeds: || vec![parquet()],
-    // Rows that a few bits stand for, as cells.
-    multiple: 4096,
-    mutations: 20_000,
 };
 
 /// A small map.
@@ -59,16 +48,4 @@ fn read_tile(bytes: &[u8]) {
         assert!(cells.len() <= plan.cells());
         plan.differences(&MAP.0);
     }
-}
-
-fn read_parquet(bytes: &[u8]) {
-    if let Ok((plan, cells)) = table::read(bytes.to_vec()) {
-        assert_eq!(cells.len(), plan.cells());
-    }
-}
-
-fn parquet() -> Vec<u8> {
-    let mut bytes = Vec::new();
-    table::write(&MAP.0, &MAP.1, &mut bytes).expect("it is written to memory");
-    bytes
 }

@@ -70,7 +70,7 @@ macro_rules! replays {
 }
 
 replays! {
-    telemetry recording tile parquet configuration manoeuvre record settings serial frames elf log
+    telemetry recording tile configuration manoeuvre record settings serial frames elf log
 }
 
 /// The counted memory is the reader's.

@@ -4,8 +4,8 @@
 //! --amplitudes 30 --margin 0.25 --transient 150 --time 200 --out FILE`; not to be edited by hand.
 //! Parameters: the paper's (preset `reconstruction`).
 //!
-//! Behind each amplitude stands its speed, and the range of amplitudes in which motions from both
-//! starts have period one or rest, there and at the neighbouring speeds.
+//! After each amplitude are its speed, and the range of amplitudes in which trajectories from both
+//! initial states have period one or come to rest, there and at the neighbouring speeds.
 
 use crate::schedule::Schedule;
 

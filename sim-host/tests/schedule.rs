@@ -23,6 +23,7 @@ fn plan(from_rpm: f64, to_rpm: f64, greatest_v: f64) -> Plan {
         amplitudes_v: Values::parts("amplitude", greatest_v, 30).unwrap(),
         edge_width_v: step_v / 16.0,
         margin: 0.25,
+        greatest_multiplier: 0.8,
         timing: Timing::new(150.0, 200.0).unwrap(),
     }
 }
@@ -34,7 +35,7 @@ fn analysis(waveform: Waveform, plan: &Plan) -> Analysis {
         stop: &AtomicBool::new(false),
         done: &|| (),
     };
-    let made = schedule(&scenario, plan, None, watch).expect("the scenarios are valid");
+    let made = schedule(&scenario, plan, watch).expect("the scenarios are valid");
     made.expect("it is not interrupted")
 }
 
@@ -56,6 +57,7 @@ fn the_ecus_table_is_what_the_analysis_gives() {
         assert!(entry.amplitude_v - range.from_v >= made.room_v);
         assert!(range.to_v - entry.amplitude_v >= made.room_v);
         assert_eq!(made.failed_checks().count(), 0, "{:?}", made.checks);
+        assert_eq!(made.lost_margins().count(), 0, "{:?}", made.margins);
         // The paper's attractor is of period one at each of them, from the other start there may be
         // rest.
         assert_eq!(made.checks.len(), 5);
@@ -126,6 +128,14 @@ fn bad_input_is_refused_and_nothing_is_written() {
         ("--margin -0.1", &["--margin -0.1", "from 0 to 1"]),
         ("--margin 1.1", &["--margin 1.1", "from 0 to 1"]),
         ("--margin nan", &["--margin NaN", "from 0 to 1"]),
+        (
+            "--greatest-multiplier 0",
+            &["--greatest-multiplier 0", "less than 1"],
+        ),
+        (
+            "--greatest-multiplier nan",
+            &["--greatest-multiplier NaN", "greater than 0"],
+        ),
         ("--square-to 0", &["square wave", "greater than 0"]),
         ("--sine-to -1", &["amplitude of the sine", "-1"]),
         ("--sine-to 20", &["bus_voltage"]),
@@ -140,102 +150,6 @@ fn bad_input_is_refused_and_nothing_is_written() {
         let line = format!("schedule {rest} {TO_FILES}");
         assert_refused(folder.path(), line.split_whitespace(), parts);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "{line}");
-    }
-}
-
-/// A grid in which motions rest, repeat, and do neither.
-const SMALL: &str = "--from 1500 --to 1900 --square-to 0.12 --sine-to 1.2 --transient 20 --time 60";
-const STEPS: &str = "--step 100 --amplitudes 8";
-
-/// Makes the small grid's map `m.parquet`.
-fn make_map(folder: &Path, rest: &str) {
-    let line = format!("map {SMALL} --speeds 5 --amplitudes 9 --parquet m.parquet {rest}");
-    assert_ends(&mut command(folder, line.split_whitespace()), 0);
-}
-
-#[test]
-fn a_map_gives_the_same_schedule() {
-    let folder = folder();
-    make_map(folder.path(), "--start both --out m.csv");
-    let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("written");
-    let cells = read("m.csv");
-    for kind in [
-        ",equilibrium,0,",
-        ",periodic,1,",
-        ",periodic,2,",
-        ",undecided,,",
-    ] {
-        assert!(cells.contains(kind), "{kind} {cells}");
-    }
-    let made = ["", "--map m.parquet"].map(|map| {
-        let line = format!("schedule {SMALL} {STEPS} {map} {TO_FILES}");
-        assert_ends(&mut command(folder.path(), line.split_whitespace()), 0);
-        FILES.map(read)
-    });
-    assert_eq!(made[0], made[1]);
-}
-
-/// Nothing is written, and the message has the command for a map that fits.
-#[test]
-fn maps_that_do_not_fit_or_are_none_are_refused() {
-    let folder = folder();
-    let at = folder.path();
-    let usual = format!("schedule {SMALL} {STEPS} --map m.parquet {TO_FILES}");
-    let refused = |line: &str, parts: &[&str]| {
-        assert_refused(at, line.split_whitespace(), parts);
-        for name in FILES {
-            assert!(!at.join(name).exists(), "{line}");
-        }
-    };
-    let grid = "--square-to 0.12 --sine-to 1.2 --amplitudes 9 --transient 20 --time 60";
-    let fits = format!("sim-host map --start both --from 1500 --to 1900 --step 100 {grid}");
-    refused(&usual, &["m.parquet", "No such file", &fits]);
-    let no_table = "no Parquet file, or not a whole one";
-    let file = at.join("m.parquet");
-    for text in ["", "no table"] {
-        fs::write(&file, text).unwrap();
-        refused(&usual, &[no_table, &fits]);
-    }
-    make_map(at, "--force --work given");
-    let lacks = "it lacks the Sine dither from the Mirrored start";
-    refused(&usual, &[lacks, &fits]);
-    make_map(at, "--force --work both --start both");
-    let whole = fs::read(&file).unwrap();
-    fs::write(&file, &whole[..whole.len() - 100]).unwrap();
-    refused(&usual, &[no_table]);
-    fs::write(&file, whole).unwrap();
-    fs::write(at.join("v.toml"), "[vehicle]\nmass_kg = 1400.0").unwrap();
-    let heavier = "vehicle.mass_kg is 1500.0, not 1400.0";
-    let command = "map --config v.toml --start both";
-    refused(&format!("{usual} --config v.toml"), &[heavier, command]);
-    for (fitting, other, part) in [
-        (
-            "--transient 20",
-            "--transient 30",
-            "transient_s is 20.0, not 30.0",
-        ),
-        (
-            "--to 1900",
-            "--to 1800",
-            "5 from 1500 to 1900 rpm, not 4 from 1500 to 1800 rpm",
-        ),
-        (
-            "--sine-to 1.2",
-            "--sine-to 1.3",
-            "9 from 0 to 1.2 V, not 9 from 0 to 1.3 V",
-        ),
-        (
-            "--amplitudes 8",
-            "--amplitudes 9",
-            "9 from 0 to 0.12 V, not 10 from 0 to 0.12 V",
-        ),
-        (
-            "--to 1900",
-            "--to 1500",
-            "5 from 1500 to 1900 rpm, not 1 from 1500 to 1500 rpm",
-        ),
-    ] {
-        refused(&usual.replace(fitting, other), &[part]);
     }
 }
 

@@ -65,6 +65,16 @@ fn ranges_are_checked() {
         &["steering angle", "greater than 0"],
     );
     assert_refused("basin --beta-step 0.001 --delta-step 0.001", &["--yes"]);
+    assert_refused("basin --over speed --from 1600", &["--to", "--step"]);
+    assert_refused("basin --from 1600 --to 1700 --step 50", &["--over"]);
+    assert_refused(
+        "basin --over speed --from 1600 --to 1700 --step 0",
+        &["in steps of 0"],
+    );
+    assert_refused(
+        "basin --over speed --from 0 --to 1700 --step 50",
+        &["run.wheel_speed_rpm = 0"],
+    );
     assert_refused(
         "equilibria --from 2000 --to 1000 --step 0",
         &["in steps of 0"],
@@ -96,6 +106,7 @@ fn the_number_of_threads_does_not_change_the_bytes() {
         "regions --from 1600 --to 1660 --step 20 --width 5 --transient 20 --time 100",
         "equilibria --from 1600 --to 1700",
         "basin --beta-step 0.2 --delta-step 0.4 --transient 20 --time 60",
+        "basin --over speed --from 1600 --to 1700 --step 100 --beta-step 0.2 --delta-step 0.4 --transient 20 --time 60",
     ]
     .into_iter()
     .enumerate()

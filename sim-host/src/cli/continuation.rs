@@ -393,6 +393,9 @@ fn show(found: &Bifurcations) {
             counted(curve.points.len(), "point"),
             ends.join("; ")
         );
+        for (condition, [first, second]) in &curve.codimension_two {
+            say!("  {condition} at {first:.4}, {second:.6}");
+        }
     }
     for reason in &found.without_branch {
         say!("no branch from {reason}");

@@ -37,14 +37,6 @@ impl ConfigOptions {
     pub fn input(&self) -> Option<Named<'_>> {
         named("--config", &self.config)
     }
-
-    /// The options of a command line, each with a leading space.
-    pub fn words(&self) -> String {
-        let preset = self.preset.iter().map(|name| format!(" --preset {name}"));
-        let config = self.config.iter();
-        let config = config.map(|file| format!(" --config {}", file.display()));
-        preset.chain(config).collect()
-    }
 }
 
 /// The scenario of a file. Reports the parameters that differ from the paper's, and a file without

@@ -5,21 +5,19 @@ use super::options::ConfigOptions;
 use super::outcome::Outcome;
 use super::output::{check, named};
 use super::sweep::with_progress;
-use anyhow::{Context, anyhow, bail, ensure};
+use anyhow::{bail, ensure};
 use dynamics::config::{differences, validate};
-use dynamics::map::cell::Cell as MapCell;
-use dynamics::map::plan::Plan as MapPlan;
 use dynamics::schedule::cells::Cell;
 use dynamics::schedule::choose::Choice;
 use dynamics::schedule::figure::draw;
-use dynamics::schedule::{Analysis, Plan, from_map, runs, schedule, source};
+use dynamics::schedule::{Analysis, Margin, Plan, runs, schedule, source};
 use dynamics::sweep::{Timing, Values};
 use dynamics::words::{Short, counted};
 use files::output::{write_json, write_rows, write_text};
 use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Compute the dither amplitude W required at each wheel speed N, for square and sine wave: the
 /// ECU's table.
@@ -29,8 +27,10 @@ use std::path::{Path, PathBuf};
 /// entry is 0. Otherwise it is the least amplitude of the first range with period one (one
 /// trajectory may be at rest) at that speed and no other regime at its neighbours, plus a margin.
 /// The map uses the averaged dither. The entries are then checked with the true signal at the PWM
-/// rate, at the table's speeds and midway. The run takes about ten seconds on 2 cores. The exit
-/// code is 1 if a speed has no such amplitude or a check fails.
+/// rate, at the table's speeds and midway. The multipliers of the orbits under each entry must stay
+/// below --greatest-multiplier, at its own speed and at its neighbours. The run takes about ten
+/// seconds on 2 cores. The exit code is 1 if a speed has no such amplitude, a multiplier is greater,
+/// or a check fails.
 #[derive(clap::Args)]
 // Finer and longer than the default map.
 #[command(
@@ -45,10 +45,6 @@ use std::path::{Path, PathBuf};
   sim-host config > vehicle.toml
   sim-host schedule --config vehicle.toml --from 1500 --to 1600 --step 50 \\
       --margin 0.5 --json schedule.json
-  # the cells of the grid from a map
-  sim-host map --start both --from 1700 --to 1800 --step 25 --square-to 0.15 \\
-      --sine-to 1.35 --amplitudes 31 --transient 150 --parquet known.parquet
-  sim-host schedule --from 1700 --to 1800 --map known.parquet
   # the ECU's table, for shared-model/src; then build the firmware
   sim-host schedule --out schedule_table.rs")]
 pub struct Arguments {
@@ -69,12 +65,17 @@ pub struct Arguments {
         allow_negative_numbers = true
     )]
     margin: f64,
+    /// Greatest modulus of a multiplier, beside 1, that an orbit under the dither may have, from 0 to
+    /// 1: the share of a perturbation that is left after a period
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = 0.8,
+        allow_negative_numbers = true
+    )]
+    greatest_multiplier: f64,
     #[command(flatten)]
     times: TimeOptions,
-    /// Read the cells of the grid from a map's Parquet file instead of computing them; scenario,
-    /// times and grid must be the same, with both initial states
-    #[arg(long, value_name = "FILE")]
-    map: Option<PathBuf>,
     /// Write the table as Rust source, the module `shared_model::schedule_table`
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -100,6 +101,7 @@ const EDGE_SHARE: f64 = 1.0 / 16.0;
 #[derive(Serialize)]
 struct Results<'a> {
     margin: f64,
+    greatest_multiplier: f64,
     timing: Timing,
     schedules: &'a [Analysis],
 }
@@ -128,19 +130,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         named("--json", &arguments.json),
         named("--figure", &arguments.figure),
     ];
-    let map = named("--map", &arguments.map);
-    check(
-        arguments.config.input().into_iter().chain(map),
-        files,
-        arguments.force,
-    )?;
-    let first_cells = arguments.first_cells(&scenario, &plans)?;
+    check(arguments.config.input(), files, arguments.force)?;
     let mut analyses = Vec::new();
-    for ((scenario, plan), first) in plans.into_iter().zip(first_cells) {
-        let known = first.as_ref().map_or(0, |cells| 2 * cells.len());
-        let made = with_progress(runs(&plan) - known, |watch| {
-            schedule(&scenario, &plan, first, watch)
-        })?;
+    for (scenario, plan) in plans {
+        let made = with_progress(runs(&plan), |watch| schedule(&scenario, &plan, watch))?;
         let Some(analysis) = made else {
             bail!("interrupted: a schedule needs all of its runs; no file was written");
         };
@@ -148,7 +141,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     arguments.write(&scenario, &analyses)?;
     analyses.iter().for_each(show);
-    let good = |a: &Analysis| a.hopeless_rpm().is_empty() && a.failed_checks().next().is_none();
+    let good = |a: &Analysis| {
+        a.hopeless_rpm().is_empty()
+            && a.lost_margins().next().is_none()
+            && a.failed_checks().next().is_none()
+    };
     Ok(if analyses.iter().all(good) {
         Outcome::Success
     } else {
@@ -167,6 +164,11 @@ impl Arguments {
             (0.0..=1.0).contains(&self.margin),
             "--margin {}: must be a share from 0 to 1",
             Short(self.margin)
+        );
+        ensure!(
+            self.greatest_multiplier > 0.0 && self.greatest_multiplier < 1.0,
+            "--greatest-multiplier {}: must be greater than 0 and less than 1",
+            Short(self.greatest_multiplier)
         );
         let (what, to_v, step_v) = self.grid.amplitudes_v(waveform);
         let amplitudes_v = match step_v {
@@ -189,6 +191,7 @@ impl Arguments {
             amplitudes_v,
             edge_width_v: EDGE_SHARE * step_v,
             margin: self.margin,
+            greatest_multiplier: self.greatest_multiplier,
             timing: self.times.timing()?,
         };
         let mut scenario = *scenario;
@@ -197,58 +200,12 @@ impl Arguments {
         Ok((scenario, plan))
     }
 
-    /// The cells of each plan's grid, if there is a map.
-    fn first_cells(
-        &self,
-        scenario: &Scenario<f64>,
-        plans: &[(Scenario<f64>, Plan); 2],
-    ) -> anyhow::Result<[Option<Vec<Cell>>; 2]> {
-        let Some(path) = &self.map else {
-            return Ok([None, None]);
-        };
-        let [(_, square), (_, sine)] = plans;
-        let fitting = from_map::fitting(scenario, square, sine)
-            .context("no map is consistent with this schedule; omit --map")?;
-        let (map, cells) = self.read_map(path, &fitting).map_err(|error| {
-            let command = self.map_command(path);
-            anyhow!(
-                "cannot use {}: {error:#}; this command creates a consistent map: `{command}`",
-                path.display()
-            )
-        })?;
-        let of = |waveform, plan| from_map::first_cells(&map, &cells, waveform, plan);
-        Ok([of(Waveform::Square, square), of(Waveform::Sine, sine)])
-    }
-
-    fn read_map(&self, path: &Path, fitting: &MapPlan) -> anyhow::Result<(MapPlan, Vec<MapCell>)> {
-        let (map, cells) = dynamics::map::table::open(path)?;
-        let misfits = from_map::misfits(&map, fitting);
-        ensure!(misfits.is_empty(), "{}", misfits.join("; "));
-        Ok((map, cells))
-    }
-
-    /// The command that creates a map: at `path`, unless a file exists there.
-    fn map_command(&self, path: &Path) -> String {
-        let path = if path.exists() {
-            Path::new("consistent.parquet")
-        } else {
-            path
-        };
-        format!(
-            "sim-host map{} --start both {} {} --parquet {}",
-            self.config.words(),
-            self.axes(self.amplitudes + 1),
-            self.times(),
-            path.display()
-        )
-    }
-
     fn step_rpm(&self) -> f64 {
         self.grid.step.expect("it has a default")
     }
 
     /// The options of the axes, with amplitudes by number or by step.
-    fn axes(&self, amplitudes: u32) -> String {
+    fn axes(&self) -> String {
         let grid = &self.grid;
         let step = |option, step: Option<f64>| step.map(|step| format!(" --{option} {step}"));
         let steps = [
@@ -256,7 +213,7 @@ impl Arguments {
             step("sine-step", grid.sine_step),
         ];
         let amplitudes = match steps {
-            [None, None] => format!(" --amplitudes {amplitudes}"),
+            [None, None] => format!(" --amplitudes {}", self.amplitudes),
             steps => steps.into_iter().flatten().collect(),
         };
         format!(
@@ -287,6 +244,7 @@ impl Arguments {
         if let Some(path) = &self.json {
             let results = Results {
                 margin: self.margin,
+                greatest_multiplier: self.greatest_multiplier,
                 timing: self.times.timing()?,
                 schedules: analyses,
             };
@@ -306,12 +264,13 @@ impl Arguments {
             _ => format!("the paper's but for {}", differences.join(", ")),
         };
         vec![
-            format!("Made by `sim-host schedule {}", self.axes(self.amplitudes)),
+            format!("Made by `sim-host schedule {}", self.axes()),
             format!(
-                "--margin {} {} --out FILE`; not to be edited by hand. Parameters: {parameters}.",
+                "--margin {} {} --out FILE`; not to be edited by hand.",
                 self.margin,
                 self.times()
             ),
+            format!("Parameters: {parameters}."),
         ]
     }
 }
@@ -328,6 +287,18 @@ fn rows(analysis: &Analysis) -> impl Iterator<Item = Row> + '_ {
     })
 }
 
+/// The multipliers at an entry, and the amplitudes at which they keep their bound.
+fn in_words(margin: &Margin) -> String {
+    let Some(multiplier) = margin.greatest_multiplier else {
+        return "; no stable orbit or equilibrium".to_owned();
+    };
+    let kept = margin.kept.map_or_else(
+        || "more than the bound".to_owned(),
+        |kept| format!("bound kept from {:.4} to {:.4} V", kept.from_v, kept.to_v),
+    );
+    format!("; greatest multiplier {multiplier:.3}, {kept}")
+}
+
 fn show(analysis: &Analysis) {
     let word = match analysis.waveform {
         Waveform::Sine => "sine",
@@ -338,7 +309,14 @@ fn show(analysis: &Analysis) {
         1e3 * analysis.edge_width_v
     );
     for entry in &analysis.entries {
-        say!("  {:.4} V  {}", entry.amplitude_v, source::remark(entry));
+        let is_its = |margin: &&Margin| margin.wheel_speed_rpm == entry.wheel_speed_rpm;
+        let margin = analysis.margins.iter().find(is_its);
+        say!(
+            "  {:.4} V  {}{}",
+            entry.amplitude_v,
+            source::remark(entry),
+            margin.map_or_else(String::new, in_words)
+        );
     }
     let count = |choice| {
         analysis
@@ -365,6 +343,14 @@ fn show(analysis: &Analysis) {
     if analysis.entries[0].amplitude_v > 0.0 {
         say!(
             "  WARNING: the first speed requires dither, and the table has none below it; reduce --from"
+        );
+    }
+    for margin in analysis.lost_margins() {
+        say!(
+            "  MARGIN LOST at {} rpm, {:.4} V, or at the amplitude of a neighbour{}; increase --margin or --greatest-multiplier",
+            margin.wheel_speed_rpm,
+            margin.amplitude_v,
+            in_words(margin)
         );
     }
     for cell in failed {

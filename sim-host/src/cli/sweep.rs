@@ -31,6 +31,16 @@ pub enum Over {
     Amplitude,
 }
 
+impl Over {
+    /// The parameter of the analyses.
+    pub fn parameter(self) -> Parameter {
+        match self {
+            Self::Speed => Parameter::Speed,
+            Self::Amplitude => Parameter::Amplitude,
+        }
+    }
+}
+
 /// The swept parameter and its values. Results are in ascending order for both orders of the ends.
 #[derive(Args)]
 pub struct RangeOptions {
@@ -52,10 +62,7 @@ pub struct RangeOptions {
 impl RangeOptions {
     /// The parameter.
     pub fn parameter(&self) -> Parameter {
-        match self.over {
-            Over::Speed => Parameter::Speed,
-            Over::Amplitude => Parameter::Amplitude,
-        }
+        self.over.parameter()
     }
 
     /// Its values.

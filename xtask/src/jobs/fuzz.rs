@@ -15,7 +15,6 @@ const TARGETS: [(&str, u64); 12] = [
     ("telemetry", 10_000_000),
     ("recording", 1_000_000),
     ("tile", 10_000_000),
-    ("parquet", 1_000_000),
     ("configuration", 2_000_000),
     ("manoeuvre", 2_000_000),
     ("record", 10_000_000),

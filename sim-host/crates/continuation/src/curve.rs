@@ -2,6 +2,7 @@
 
 use crate::arclength::{End, Evaluation, Point, Problem, Settings, walk};
 use crate::branch::VANISHED;
+use crate::codimension_two::{self, CodimensionTwo, Condition, interpolated};
 use crate::equilibrium::{Equilibria, Equilibrium};
 use crate::failure::Failure;
 use crate::orbit::{Orbit, Shooting};
@@ -80,6 +81,8 @@ impl<P: Problem> Problem for Zero<P> {
 pub struct Curve<T> {
     /// The solutions.
     pub points: Vec<T>,
+    /// Points of codimension two on it.
+    pub codimension_two: Vec<CodimensionTwo>,
     /// Why it ends.
     pub end: End,
 }
@@ -104,6 +107,7 @@ pub fn of_orbits<S: System<N>, const N: usize, const K: usize>(
     let test = Rc::new(move |orbit: &Orbit<S::Mode, N>| kind.test(orbit));
     let mut curve = Curve {
         points: Vec::new(),
+        codimension_two: Vec::new(),
         end: End::Points,
     };
     let size = orbit.size();
@@ -114,7 +118,28 @@ pub fn of_orbits<S: System<N>, const N: usize, const K: usize>(
         &[first, first + 1],
         settings,
         |step| {
-            let orbit = &step.to.solution;
+            let (before, orbit) = (&step.from.solution, &step.to.solution);
+            let tests = [before, orbit].map(|orbit| codimension_two::of_orbit(kind, orbit));
+            curve.codimension_two.extend(codimension_two::between(
+                (&tests[0], before.parameters),
+                (&tests[1], orbit.parameters),
+            ));
+            let along = [first, first + 1]
+                .map(|k| step.from.tangent[k] * step.to.tangent[k])
+                .iter()
+                .sum::<f64>();
+            let at_once = [
+                (Condition::Cusp, along < 0.0),
+                (Condition::Grazing, !orbit.has_modes_of(before)),
+            ];
+            let middle = interpolated(before.parameters, orbit.parameters, 0.5);
+            let held = at_once.into_iter().filter(|(_, holds)| *holds);
+            curve
+                .codimension_two
+                .extend(held.map(|(condition, _)| CodimensionTwo {
+                    condition,
+                    parameters: middle,
+                }));
             curve.points.push(orbit.clone());
             (orbit.size() < VANISHED * size).then_some(End::Equilibrium)
         },
@@ -136,6 +161,8 @@ pub fn of_hopf<S: System<N>, const N: usize, const K: usize>(
     settings: &Settings,
 ) -> Result<Curve<Equilibrium<N>>, Failure> {
     let inner = Equilibria::<S, N, K>::new(system, mode, sizes, at.parameters, &settings.spans());
+    // The coefficient is that of the system at the equilibrium's own parameters.
+    let equations = inner.clone();
     let guess = inner.unknowns(&at.x, at.parameters);
     let mut axis = DVector::zeros(guess.len());
     axis[N + 1] = sign;
@@ -145,6 +172,7 @@ pub fn of_hopf<S: System<N>, const N: usize, const K: usize>(
     let test = Rc::new(move |equilibrium: &Equilibrium<N>| equilibrium.hopf_test() / size);
     let mut curve = Curve {
         points: Vec::new(),
+        codimension_two: Vec::new(),
         end: End::Points,
     };
     curve.end = walk(
@@ -154,7 +182,14 @@ pub fn of_hopf<S: System<N>, const N: usize, const K: usize>(
         &[N, N + 1],
         settings,
         |step| {
-            curve.points.push(step.to.solution.clone());
+            let (before, at) = (&step.from.solution, &step.to.solution);
+            let tests = [before, at]
+                .map(|at| codimension_two::of_hopf(at, equations.first_lyapunov_coefficient(at)));
+            curve.codimension_two.extend(codimension_two::between(
+                (&tests[0], before.parameters),
+                (&tests[1], at.parameters),
+            ));
+            curve.points.push(at.clone());
             None
         },
     )?;

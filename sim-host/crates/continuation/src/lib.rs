@@ -2,6 +2,7 @@
 
 pub mod arclength;
 pub mod branch;
+mod codimension_two;
 pub mod curve;
 pub mod equilibrium;
 mod failure;
@@ -12,5 +13,6 @@ mod test_function;
 pub mod trajectory;
 pub mod vehicle;
 
+pub use codimension_two::{CodimensionTwo, Condition};
 pub use failure::Failure;
 pub use test_function::Bifurcation;

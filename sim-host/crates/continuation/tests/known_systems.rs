@@ -1,6 +1,5 @@
 //! Orbits and bifurcations that are known: by a closed form, from the literature, or by another program.
 
-use continuation::Bifurcation;
 use continuation::arclength::{End, Settings};
 use continuation::branch::{Branch, follow, orbit_at};
 use continuation::curve;
@@ -8,6 +7,7 @@ use continuation::equilibrium::{self, Equilibria};
 use continuation::orbit::{Guess, Orbit, Shooting};
 use continuation::start::{Search, near_returns};
 use continuation::system::{Equations, Parameters, System};
+use continuation::{Bifurcation, Condition};
 use nalgebra::{SVector, Vector2, Vector3, Vector4};
 use shared_model::Real;
 use std::f64::consts::TAU;
@@ -419,6 +419,29 @@ fn the_fold_of_a_radial_orbit_and_its_curve() {
         let [mu, nu] = orbit.parameters;
         assert!((mu + nu * nu / 4.0).abs() < 1e-8, "{mu} {nu}");
     }
+}
+
+/// Its Hopf bifurcation is at mu = 0, and subcritical where nu > 0: at nu = 0 the first Lyapunov coefficient is
+/// zero, where the curve of the fold ends (N. N. Bautin).
+#[test]
+fn the_hopf_curve_of_a_radial_orbit_changes_its_criticality_where_the_fold_ends() {
+    let system = Radial::PLAIN;
+    let sizes = Vector2::new(1.0, 1.0);
+    let settings = Settings::over(&[(-0.5, 0.5)]);
+    let start = [-0.3, 1.0];
+    let problem = Equilibria::<_, 2, 4>::new(&system, (), &sizes, start, &settings.spans());
+    let guess = problem.unknowns(&Vector2::zeros(), start);
+    let branch = equilibrium::follow(&problem, guess, 1.0, &settings).unwrap();
+    let hopf = &branch.hopf[0];
+    let settings = Settings::over(&[(-0.5, 0.5), (-1.0, 2.0)]);
+    let curve = curve::of_hopf::<_, 2, 4>(&system, (), &sizes, &hopf.at, -1.0, &settings).unwrap();
+    let [point] = &curve.codimension_two[..] else {
+        panic!("{:?}", curve.codimension_two)
+    };
+    assert_eq!(point.condition, Condition::GeneralisedHopf);
+    // Differences of the Jacobian, 1e-3 apart, take the term of fifth degree for one of third.
+    let [mu, nu] = point.parameters;
+    assert!(mu.abs() < 1e-9 && nu.abs() < 5e-6, "{mu} {nu}");
 }
 
 #[test]

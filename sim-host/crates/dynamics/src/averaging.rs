@@ -43,6 +43,18 @@ pub struct Comparison {
 ///
 /// # Errors
 /// If a scenario is not valid.
+///
+/// ```
+/// use shared_model::dither::Waveform;
+///
+/// let mut scenario = shared_model::Scenario::reconstruction();
+/// scenario.dither.waveform = Waveform::Square;
+/// scenario.dither.amplitude_v = 0.1;
+/// let compared = dynamics::averaging::compare(&scenario, &[2000.0])?;
+/// assert_eq!((compared[0].period, compared[0].averaged_period), (Some(1), Some(1)));
+/// assert!(compared[0].swing_difference_percent.unwrap().abs() < 1.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn compare(
     scenario: &Scenario<f64>,
     frequencies_rad_per_s: &[f64],

@@ -1,9 +1,9 @@
-//! Basins of attraction: which start ends on which attractor.
+//! Basins of attraction: which start ends on which attractor, and which share of the starts does.
 
 use crate::attractor::{Attractor, Kind, attractors};
 use crate::equilibria;
-use crate::sweep::{RunControl, SweepError, Timing, Values};
-use plot::chart::{AxisSpec, Chart, Panel, large_dots};
+use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
+use plot::chart::{AxisSpec, Chart, Look, Panel, Series, large_dots};
 use shared_model::Scenario;
 
 /// One start, and where it ends.
@@ -95,6 +95,159 @@ pub fn basin(
     };
     let attractors = found.into_iter().map(name).collect();
     Ok(Basin { attractors, cells })
+}
+
+/// Share of the starts that end on attractors of a kind on one side.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Share {
+    /// Kind of the attractors.
+    pub kind: Kind,
+    /// Side of the steering angle on which they are: positive, negative or both.
+    pub lobe: &'static str,
+    /// Starts that end there.
+    pub starts: usize,
+    /// Their share of all.
+    pub share: f64,
+    /// Its binomial standard error, as if the starts were drawn at random: sqrt(p (1 - p) / n).
+    pub standard_error: f64,
+}
+
+/// Basin stability at one value of a parameter.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Stability {
+    /// The parameter's value.
+    pub value: f64,
+    /// The shares, the greatest first.
+    pub shares: Vec<Share>,
+}
+
+/// Basin stability over a parameter: the shares of the same grid of starts that end on attractors of each kind
+/// and side (P. J. Menck et al., Nature Physics 9 (2013) 89). The last value may be missing after an
+/// interruption.
+///
+/// Time grows with the number of values times that of [`basin`].
+///
+/// # Errors
+/// If a scenario is not valid.
+///
+/// ```
+/// use dynamics::attractor::Kind;
+/// use dynamics::basin::stability;
+/// use dynamics::sweep::{Parameter, RunControl, Timing, Values};
+///
+/// let mut scenario = shared_model::Scenario::reconstruction();
+/// scenario.friction.coefficient = 0.0;
+/// let speeds = Values::new("wheel speed (rpm)", 1000.0, 1000.0, 1.0)?;
+/// let angles = Values::new("angle (rad)", -0.2, 0.2, 0.4)?;
+/// let timing = Timing::new(100.0, 200.0)?;
+/// let found = stability(&scenario, Parameter::Speed, &speeds, (&angles, &angles), timing, RunControl::none())?;
+/// // Without friction and at a low speed all starts come to rest, half of them on each side.
+/// assert!(found[0].shares.iter().all(|share| share.kind == Kind::Equilibrium && share.share == 0.5));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn stability(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    values: &Values,
+    (sideslips_rad, steering_angles_rad): (&Values, &Values),
+    timing: Timing,
+    control: RunControl,
+) -> Result<Vec<Stability>, SweepError> {
+    let starts = sideslips_rad.count() * steering_angles_rad.count();
+    let mut found = Vec::new();
+    for scenario in scenarios(scenario, parameter, values)? {
+        let basin = basin(
+            &scenario,
+            sideslips_rad,
+            steering_angles_rad,
+            timing,
+            control,
+        )?;
+        if basin.cells.len() < starts {
+            break;
+        }
+        let value = parameter.of(&scenario);
+        let shares = shares(&basin);
+        found.push(Stability { value, shares });
+    }
+    Ok(found)
+}
+
+fn shares(basin: &Basin) -> Vec<Share> {
+    let all = basin.cells.len();
+    let mut shares: Vec<Share> = Vec::new();
+    for (k, attractor) in basin.attractors.iter().enumerate() {
+        let starts = basin
+            .cells
+            .iter()
+            .filter(|cell| cell.attractor == k)
+            .count();
+        let (kind, lobe) = (attractor.kind, attractor.lobe());
+        let same = |share: &&mut Share| share.kind == kind && share.lobe == lobe;
+        match shares.iter_mut().find(same) {
+            Some(share) => share.starts += starts,
+            None => shares.push(Share {
+                kind,
+                lobe,
+                starts,
+                share: 0.0,
+                standard_error: 0.0,
+            }),
+        }
+    }
+    for share in &mut shares {
+        let p = share.starts as f64 / all as f64;
+        share.share = p;
+        share.standard_error = (p * (1.0 - p) / all as f64).sqrt();
+    }
+    shares.sort_by_key(|share| std::cmp::Reverse(share.starts));
+    shares
+}
+
+/// The regime of a kind: fewer than there are periods.
+fn regime(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Equilibrium => "at rest",
+        Kind::Periodic(_) => "periodic",
+        Kind::Chaos | Kind::BandedChaos(_) => "chaos",
+        Kind::Undecided | Kind::Diverges | Kind::NotFollowed(_) => "undecided or divergent",
+    }
+}
+
+/// Shares of the initial states over the parameter, by regime and side.
+pub fn stability_chart(found: &[Stability], parameter: Parameter) -> Chart {
+    let group = |share: &Share| (regime(share.kind), share.lobe);
+    let mut groups: Vec<_> = found
+        .iter()
+        .flat_map(|one| &one.shares)
+        .map(group)
+        .collect();
+    groups.sort();
+    groups.dedup();
+    let series = |(k, &(regime, lobe)): (usize, &(&'static str, &'static str))| {
+        let share_at = |one: &Stability| {
+            let its = one
+                .shares
+                .iter()
+                .filter(|share| group(share) == (regime, lobe));
+            (one.value, its.map(|share| share.share).sum())
+        };
+        Series {
+            label: format!("{regime}, steering angle {lobe}"),
+            points: found.iter().map(share_at).collect(),
+            look: Look::Line(k),
+        }
+    };
+    Chart {
+        heading: "Basin stability".into(),
+        panels: vec![Panel {
+            caption: "share of the initial states that approach attractors of each regime".into(),
+            x: AxisSpec::linear(parameter.name()),
+            y: AxisSpec::linear("share"),
+            series: groups.iter().enumerate().map(series).collect(),
+            ..Panel::default()
+        }],
+    }
 }
 
 /// Initial states by the attractor that they approach.

@@ -36,6 +36,8 @@ const FARTHEST: f64 = 0.1;
 const ON_ORBIT: f64 = 1e-7;
 /// An orbit of less than this share of the trajectory's extent is the equilibrium within it.
 const SHRUNK: f64 = 1e-2;
+/// Steps in which a range of equilibria is searched, and halvings of one.
+const REST_STEPS: u32 = 12;
 
 pub(crate) type VehicleOrbit = Orbit<FrictionMode, 4>;
 
@@ -91,6 +93,128 @@ pub(crate) fn end_of_orbit(
     let special = branch.specials.iter().find(is_end)?;
     let value = special.orbit.parameters[0];
     Some((special.kind.name(), value, special.parameter_error))
+}
+
+/// How perturbations of what a trajectory ends on decay, and where over a parameter they keep a margin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Decay {
+    /// Share of a perturbation that is left after a period: the greatest modulus of a multiplier beside 1.
+    pub multiplier: f64,
+    /// Range around the scenario's value in which that share stays below the margin; the value alone where it
+    /// does not.
+    pub from: f64,
+    /// Its upper end.
+    pub to: f64,
+}
+
+/// The decay beside the trajectory from `end`, and the range of the parameter within `range` in which the
+/// multipliers stay below `margin`. `None` without a stable orbit or equilibrium that the trajectory approaches.
+pub(crate) fn decay(
+    scenario: &Scenario<f64>,
+    parameter: Parameter,
+    end: &[f64; 4],
+    range: (f64, f64),
+    margin: f64,
+) -> Option<Decay> {
+    let vehicle = Vehicle::new(scenario, [parameter.key(), "vehicle.mass_kg"]).ok()?;
+    let value = vehicle.parameters()[0];
+    let compared = Compared::new(&vehicle, end)?;
+    let is_its_end = |orbit: &VehicleOrbit| orbit.is_stable() && compared.approaches(orbit);
+    let Some(orbit) = compared.orbits().find(is_its_end) else {
+        let state = compared.equilibrium(scenario).unwrap_or(*end);
+        let left = |value| left_at_rest(&parameter.set(scenario, value), &state);
+        let [from, to] = [range.0, range.1].map(|bound| last_below(left, value, bound, margin));
+        return Some(Decay {
+            multiplier: left(value)?,
+            from,
+            to,
+        });
+    };
+    let multiplier = greatest_multiplier(&orbit);
+    let settings = Settings::over(&[range]);
+    let spans = settings.spans();
+    let problem =
+        Shooting::<_, 4, 6>::new(&vehicle, &orbit.guess(), &spans, 1, BRANCH_TOLERANCE).ok()?;
+    let guess = problem
+        .guess(orbit.start(), orbit.period_s, orbit.parameters)
+        .ok()?;
+    let keeps = |orbit: &VehicleOrbit| greatest_multiplier(orbit) <= margin;
+    let bound = |sign| {
+        let axis = problem.parameter_axis(sign);
+        let branch = follow(&problem, guess.clone(), &axis, &settings, keeps).ok()?;
+        let values = branch
+            .orbits
+            .iter()
+            .map(|orbit| (orbit.parameters[0], greatest_multiplier(orbit)));
+        Some(crossing(values, margin))
+    };
+    Some(Decay {
+        multiplier,
+        from: bound(-1.0)?,
+        to: bound(1.0)?,
+    })
+}
+
+fn greatest_multiplier(orbit: &VehicleOrbit) -> f64 {
+    let moduli = orbit.multipliers.iter().map(|multiplier| multiplier.norm());
+    moduli.fold(0.0, f64::max)
+}
+
+/// The parameter's value at which the multiplier passes the margin, by interpolation; the last value if it does
+/// not.
+fn crossing(values: impl Iterator<Item = (f64, f64)>, margin: f64) -> f64 {
+    let mut last = None;
+    for (value, multiplier) in values {
+        match last {
+            Some((before, kept)) if multiplier > margin => {
+                return before + (value - before) * (margin - kept) / (multiplier - kept);
+            }
+            _ if multiplier > margin => return value,
+            _ => last = Some((value, multiplier)),
+        }
+    }
+    last.map_or(f64::NAN, |(value, _)| value)
+}
+
+/// Share of a perturbation of the equilibrium near `state` that is left after a turn of its slowest oscillation;
+/// nothing where the steering sticks.
+fn left_at_rest(scenario: &Scenario<f64>, state: &[f64; 4]) -> Option<f64> {
+    let all = equilibria::find(scenario).ok()?;
+    if let Some(held) = all.iter().find(|equilibrium| equilibrium.holds(state)) {
+        return held.stable.then_some(0.0);
+    }
+    let apart =
+        |e: &equilibria::Equilibrium| (Vector4::from(e.state) - Vector4::from(*state)).norm();
+    let nearest = all.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)))?;
+    let left = nearest.eigenvalues_per_s.iter().map(|value| {
+        let turn_s = std::f64::consts::TAU / value.im.abs();
+        (value.re * turn_s).exp()
+    });
+    Some(left.fold(0.0, f64::max))
+}
+
+/// The value farthest from `from` towards `to` up to which a quantity stays below the margin, by bisection in
+/// each of some steps.
+fn last_below(left: impl Fn(f64) -> Option<f64>, from: f64, to: f64, margin: f64) -> f64 {
+    let keeps = |value| left(value).is_some_and(|left| left <= margin);
+    let mut kept = from;
+    for step in 1..=REST_STEPS {
+        let mut lost = from + (to - from) * f64::from(step) / f64::from(REST_STEPS);
+        if keeps(lost) {
+            kept = lost;
+            continue;
+        }
+        for _ in 0..REST_STEPS {
+            let middle = 0.5 * (kept + lost);
+            if keeps(middle) {
+                kept = middle;
+            } else {
+                lost = middle;
+            }
+        }
+        return kept;
+    }
+    kept
 }
 
 /// A trajectory, to be compared with what is beside it.

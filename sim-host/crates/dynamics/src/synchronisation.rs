@@ -123,6 +123,29 @@ pub enum NoThreshold {
 ///
 /// # Errors
 /// If the motion diverges or is too short, or if the interval does not hold the threshold.
+///
+/// ```
+/// use dynamics::synchronisation::{Search, largest};
+/// use dynamics::flow::Flow;
+/// use nalgebra::Vector1;
+/// use shared_model::Real;
+///
+/// /// x' = -x: two trajectories approach each other at 1 1/s.
+/// struct Decay;
+///
+/// impl Flow<1> for Decay {
+///     fn step<T: Real>(&self, x: &Vector1<T>) -> Vector1<T> {
+///         x * T::from_f64((-self.step_s()).exp())
+///     }
+///     fn step_s(&self) -> f64 {
+///         1e-2
+///     }
+/// }
+///
+/// let threshold = largest(&Decay, &Vector1::new(0.1), 100.0, Search::default())?;
+/// assert!((threshold.exponent.per_s + 1.0).abs() <= threshold.tolerance_per_s);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn largest<const N: usize>(
     flow: &impl Flow<N>,
     start: &SVector<f64, N>,

@@ -22,6 +22,28 @@ const INTERVAL_S: f64 = 0.1;
 ///
 /// # Errors
 /// If the motion diverges, or is too short.
+///
+/// ```
+/// use dynamics::flow::Flow;
+/// use nalgebra::Vector1;
+/// use shared_model::Real;
+///
+/// /// x' = -x: two trajectories approach each other at 1 1/s.
+/// struct Decay;
+///
+/// impl Flow<1> for Decay {
+///     fn step<T: Real>(&self, x: &Vector1<T>) -> Vector1<T> {
+///         x * T::from_f64((-self.step_s()).exp())
+///     }
+///     fn step_s(&self) -> f64 {
+///         1e-2
+///     }
+/// }
+///
+/// let exponent = dynamics::two_particle::largest(&Decay, &Vector1::new(0.1), 100.0)?;
+/// assert!((exponent.unwrap().per_s + 1.0).abs() < 1e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn largest<const N: usize>(
     flow: &impl Flow<N>,
     start: &SVector<f64, N>,

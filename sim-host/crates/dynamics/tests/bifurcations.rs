@@ -1,11 +1,12 @@
 //! Bifurcations by continuation, beside what trajectories and equilibria show.
 
-use dynamics::bifurcations::{Bifurcations, BifurcationsError, Plan, bifurcations};
+use dynamics::attractor::attractor;
+use dynamics::bifurcations::{Bifurcations, BifurcationsError, Curve, Plan, bifurcations};
 use dynamics::component::Component;
 use dynamics::poincare::crossings;
 use dynamics::section::{Direction, Section};
 use dynamics::simulate::started_at;
-use dynamics::sweep::{RunControl, Values};
+use dynamics::sweep::{RunControl, Timing, Values};
 use dynamics::{equilibria, sweep::mirrored};
 use nalgebra::Vector4;
 use shared_model::Scenario;
@@ -155,6 +156,36 @@ fn the_curve_of_a_doubling_meets_the_branches_at_its_points() {
         (doubling - point.parameters[0]).abs() < 1e-4,
         "{doubling} {point:?}"
     );
+}
+
+/// Long simulations on both sides of the curve of a doubling in speed and amplitude, each from the end of the one
+/// before: the settled orbit has one cycle down to a millivolt above the curve, and none has a millivolt below.
+/// From other initial states there is chaos above it too, since the doubling is subcritical.
+#[test]
+fn the_curve_of_a_doubling_is_the_edge_of_the_simulated_orbits() {
+    let mut plan = plan(0.28, 1750.0, (0.0, 0.1));
+    plan.scenario.dither.waveform = Waveform::Square;
+    plan.scenario.dither.amplitude_v = 0.05;
+    plan.parameter = "dither.amplitude_v".into();
+    plan.second = Some(("run.wheel_speed_rpm".into(), (1680.0, 1900.0)));
+    let found = bifurcations(&plan).unwrap();
+    let is_doubling = |curve: &&Curve| curve.kind == "period doubling";
+    let curve = found.curves.iter().find(is_doubling).unwrap();
+    assert!(curve.points.len() > 10 && curve.codimension_two.is_empty());
+    for point in curve.points.iter().step_by(4) {
+        let [amplitude_v, rpm] = point.parameters;
+        let mut scenario = plan.scenario;
+        scenario.run.wheel_speed_rpm = rpm;
+        for beside_mv in [30.0, 10.0, 3.0, 1.0, -1.0] {
+            scenario.dither.amplitude_v = amplitude_v + 1e-3 * beside_mv;
+            let timing = Timing::new(500.0, 700.0).unwrap();
+            let found = attractor(&scenario, timing, false).unwrap();
+            let is_one_cycle = found.cycles == Some(1);
+            assert_eq!(is_one_cycle, beside_mv > 0.0, "{point:?} {beside_mv} mV");
+            let end = Model::new(&scenario).state(found.end.into());
+            scenario = started_at(&scenario, &end);
+        }
+    }
 }
 
 /// The equations are odd: with the motor's torque and the initial state of the other sign there is the same

@@ -170,5 +170,10 @@ fn curves(found: &Bifurcations) -> Vec<Series> {
             look: Look::Line(style),
         });
     }
+    let named = found.curves.iter().flat_map(|curve| &curve.codimension_two);
+    let named: Vec<_> = named.map(|(_, [x, y])| (*x, *y)).collect();
+    if !named.is_empty() {
+        series.extend(large_dots("codimension two", kinds.len(), named));
+    }
     series
 }

@@ -31,8 +31,10 @@ use shared_model::{InvalidScenario, Scenario};
 const SIZES: Vector4<f64> = Vector4::new(0.3, 1.0, 0.5, 1.0);
 /// Tolerance of the search for a start.
 const SEARCH_TOLERANCE: f64 = 1e-9;
-/// A return that near, as a share of the extent, is that of a settled orbit.
+/// A return after one cycle that near, as a share of the extent, is that of a settled orbit.
 const SETTLED: f64 = 1e-3;
+/// The same after several cycles: chaos too returns to a thousandth within some hundred cycles.
+const SETTLED_AFTER_SEVERAL: f64 = 1e-6;
 /// What is observed after the transient, s.
 const JUST_AFTER_S: f64 = 0.01;
 /// Most cycles of an orbit that is searched for.
@@ -147,6 +149,8 @@ pub struct Curve {
     pub kind: &'static str,
     /// Its points in order.
     pub points: Vec<CurvePoint>,
+    /// Points of codimension two on it: the second condition and both parameters.
+    pub codimension_two: Vec<(&'static str, [f64; 2])>,
     /// Why it ends, at both ends.
     pub ends: Vec<End>,
 }
@@ -350,7 +354,10 @@ impl<'a> Work<'a> {
             Some(cycles) => returns.iter().find(|found| found.cycles == cycles),
             None => returns
                 .iter()
-                .find(|found| found.distance < SETTLED)
+                .find(|found| match found.cycles {
+                    1 => found.distance < SETTLED,
+                    _ => found.distance < SETTLED_AFTER_SEVERAL,
+                })
                 .or(returns.first()),
         };
         let Some(chosen) = chosen else {
@@ -630,10 +637,14 @@ impl<'a> Work<'a> {
         point: impl Fn(&T) -> CurvePoint,
     ) {
         let mut points: Vec<CurvePoint> = Vec::new();
+        let mut codimension_two = Vec::new();
         let mut ends = Vec::new();
         for side in sides {
             match side {
                 Ok(side) => {
+                    let named = side.codimension_two.iter();
+                    codimension_two
+                        .extend(named.map(|point| (point.condition.name(), point.parameters)));
                     points.reverse();
                     let known = usize::from(!points.is_empty());
                     points.extend(side.points.iter().skip(known).map(&point));
@@ -642,7 +653,12 @@ impl<'a> Work<'a> {
                 Err(failure) => ends.push(End::Failed(failure)),
             }
         }
-        self.found.curves.push(Curve { kind, points, ends });
+        self.found.curves.push(Curve {
+            kind,
+            points,
+            codimension_two,
+            ends,
+        });
     }
 }
 

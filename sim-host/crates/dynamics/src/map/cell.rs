@@ -144,6 +144,26 @@ pub enum InvalidCell {
 ///
 /// # Errors
 /// If a place's scenario is not valid, or none for the engine.
+///
+/// ```
+/// use dynamics::map::cell::{Kind, cells};
+/// use dynamics::map::plan::{Grid, Plan, Sheet, Start};
+/// use dynamics::sweep::Timing;
+/// use shared_model::dither::Waveform;
+///
+/// let grid = |from, to| Grid { from, to, count: 2 };
+/// let sheet = Sheet { waveform: Waveform::Square, start: Start::Given, amplitudes_v: grid(0.0, 0.1) };
+/// let scenario = shared_model::Scenario::reconstruction();
+/// let plan = Plan::new(scenario, vec![sheet], grid(1600.0, 1750.0), Timing::new(200.0, 400.0)?)?;
+/// let found = cells(&plan, &plan.places(0))?;
+/// let at = |rpm, volts| {
+///     let is_it = |cell: &&dynamics::map::cell::Cell| cell.wheel_speed_rpm == rpm && cell.dither_amplitude_v == volts;
+///     found.iter().find(is_it).unwrap().kind
+/// };
+/// // Chaos at 1750 rpm, which dither ends.
+/// assert_eq!((at(1750.0, 0.0), at(1750.0, 0.1)), (Kind::Chaos, Kind::Periodic));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn cells(plan: &Plan, places: &[Place]) -> Result<Vec<Cell>, Unsupported> {
     let scenarios: Vec<_> = places.iter().map(|place| plan.motion(place)).collect();
     let timing = Timing {

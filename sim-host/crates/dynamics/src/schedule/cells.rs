@@ -113,13 +113,11 @@ pub fn cells(
 
 /// The column of each wheel speed of the plan; `None` if it was stopped.
 ///
-/// It begins with the plan's grid, whose cells are run unless they are there `first`. Edges are
-/// bisected between rest, period one and all else, all of them side by side; those within all else
-/// are not.
+/// It begins with the plan's grid. Edges are bisected between rest, period one and all else, all of
+/// them side by side; those within all else are not.
 pub(super) fn columns(
     scenario: &Scenario<f64>,
     plan: &Plan,
-    first: Option<Vec<Cell>>,
     control: RunControl,
 ) -> Result<Option<Vec<Column>>, SweepError> {
     let at = |rpm, volts| {
@@ -127,12 +125,8 @@ pub(super) fn columns(
         Parameter::Amplitude.set(&scenario, volts)
     };
     let of_speed = |rpm| plan.amplitudes_v.iter().map(move |volts| at(rpm, volts));
-    let grid = || {
-        let grid: Vec<_> = plan.speeds_rpm.iter().flat_map(of_speed).collect();
-        cells(&grid, plan.timing, control)
-    };
-    let first = first.map_or_else(grid, |first| Ok(Some(first)))?;
-    let Some(mut all) = first else {
+    let grid: Vec<_> = plan.speeds_rpm.iter().flat_map(of_speed).collect();
+    let Some(mut all) = cells(&grid, plan.timing, control)? else {
         return Ok(None);
     };
     loop {

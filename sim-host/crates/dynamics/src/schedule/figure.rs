@@ -15,6 +15,12 @@ const TICKS_UP: usize = 8;
 /// Dark against all shades, on an edge that is light against them.
 const SCHEDULE: Line = Line::solid(Colour(0xa3, 0x12, 0x12), 6);
 const EDGE: Line = Line::solid(Colour(0xfe, 0xfe, 0xfe), 12);
+/// Dashed, so that it is no edge of a shade.
+const BOUND: Line = Line {
+    colour: Colour(0x1f, 0x4e, 0x9c),
+    width: 3,
+    dashes: "18 8",
+};
 const COEXIST: Line = Line::solid(Colour(0x0a, 0x0a, 0x0a), 2);
 
 /// Also grey in steps of lightness.
@@ -30,20 +36,22 @@ fn shade(class: Class) -> Colour {
 
 /// The map of each analysis with its schedule, as an SVG document.
 pub fn draw(analyses: &[Analysis]) -> String {
-    let heading = "Motion over wheel speed and dither amplitude, and the schedule";
+    let heading = "Regime over wheel speed and dither amplitude, and the schedule";
     let height = stack_height(analyses.len(), PANEL_HEIGHT);
     figure(heading, &legend(analyses), height, |area| {
         let rows = stack(area, analyses.len(), PANEL_HEIGHT, "wheel speed (rpm)");
         for (analysis, (row, name)) in analyses.iter().zip(rows) {
             let caption = match analysis.waveform {
-                Waveform::Sine => "sine: the worse of the motions from both starts",
+                Waveform::Sine => "sine: the worse regime of both initial states",
                 Waveform::Square | Waveform::None => {
-                    "square wave: the worse of the motions from both starts"
+                    "square wave: the worse regime of both initial states"
                 }
             };
             let (x, y) = axes(analysis, name);
             let panel = Axes::new(&row, (caption, ""), x, y);
             map(&panel, analysis);
+            let [lower, upper] = bounds(analysis);
+            panel.lines(&[(&lower, BOUND), (&upper, BOUND)]);
             let steps = steps(analysis);
             panel.lines(&[(&steps, EDGE), (&steps, SCHEDULE)]);
         }
@@ -58,8 +66,12 @@ fn legend(analyses: &[Analysis]) -> Vec<(String, Sample)> {
         .map(|class| (class.name().to_owned(), Sample::Shade(shade(class))))
         .collect();
     if cells().any(Cell::coexist) {
-        let label = "one start at rest, the other in motion";
+        let label = "from one initial state to rest, not from the other";
         legend.push((label.into(), Sample::Line(COEXIST)));
+    }
+    if analyses.iter().any(|one| !one.margins.is_empty()) {
+        let label = "bound of the multipliers";
+        legend.push((label.into(), Sample::Line(BOUND)));
     }
     legend.push(("schedule".into(), Sample::Line(SCHEDULE)));
     legend
@@ -131,6 +143,18 @@ fn stretches<K: PartialEq>(column: &Column, of: impl Fn(&Cell) -> K) -> Vec<(f64
         begin = end;
     }
     stretches
+}
+
+/// Least and greatest amplitude at which the multipliers keep their bound, over the speed.
+fn bounds(analysis: &Analysis) -> [Vec<Point>; 2] {
+    let kept = |margin: &super::Margin| Some((margin.wheel_speed_rpm, margin.kept?));
+    let kept: Vec<_> = analysis.margins.iter().filter_map(kept).collect();
+    [
+        kept.iter()
+            .map(|(rpm, range)| (*rpm, range.from_v))
+            .collect(),
+        kept.iter().map(|(rpm, range)| (*rpm, range.to_v)).collect(),
+    ]
 }
 
 /// The schedule as it is looked up: between two speeds the larger of their amplitudes.

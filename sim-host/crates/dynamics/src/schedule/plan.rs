@@ -14,11 +14,18 @@ pub struct Plan {
     pub edge_width_v: f64,
     /// Share of its range by which an amplitude lies above the least one: 0 to 1.
     pub margin: f64,
+    /// Greatest modulus of a multiplier beside 1 of the orbits under an amplitude: 0 to 1.
+    pub greatest_multiplier: f64,
     /// Times of each run.
     pub timing: Timing,
 }
 
 impl Plan {
+    /// The greatest amplitude looked at, V.
+    pub(super) fn greatest_amplitude_v(&self) -> f64 {
+        self.amplitudes_v.iter().fold(0.0, f64::max)
+    }
+
     /// Checks that the scenario can be run at every speed and at every amplitude of the plan.
     ///
     /// # Errors

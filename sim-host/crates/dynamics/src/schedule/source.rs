@@ -5,23 +5,45 @@ use super::choose::{Choice, Entry};
 use shared_model::dither::Waveform;
 use std::fmt::Write;
 
+/// Most columns of a line, as rustfmt is set up.
+const COLUMNS: usize = 100;
+
+/// What the remarks in the table mean.
+const REMARKS: &str = "After each amplitude are its speed, and the range of amplitudes in which \
+    trajectories from both initial states have period one or come to rest, there and at the \
+    neighbouring speeds.";
+
 /// Source of `shared_model::schedule_table` for schedules over the same speeds; `made_by` is the
 /// command and what it was run on, a sentence each. The text is formatted as rustfmt does, and
 /// depends on nothing else.
 pub fn source(analyses: &[Analysis], made_by: &[String]) -> String {
     let points = analyses.first().map_or(0, |one| one.entries.len());
     let mut text = String::from("//! The ECU's dither schedules.\n//!\n");
-    for line in made_by {
-        text += &format!("//! {line}\n");
-    }
-    text += "//!\n//! Behind each amplitude stands its speed, and the range of amplitudes in which motions from both starts have period one or\n\
-        //! rest, there and at the neighbouring speeds.\n\n\
-        use crate::schedule::Schedule;\n\n/// Wheel speeds of a schedule.\n";
+    text += &comment(&made_by.join(" "));
+    text += "//!\n";
+    text += &comment(REMARKS);
+    text += "\nuse crate::schedule::Schedule;\n\n/// Wheel speeds of a schedule.\n";
     text += &format!("pub const POINTS: usize = {points};\n");
     for analysis in analyses {
         text += &table(analysis);
     }
     text
+}
+
+/// A text in lines of a module's comment.
+fn comment(text: &str) -> String {
+    let mut lines = String::new();
+    let mut line = String::from("//!");
+    for word in text.split(' ') {
+        if line.len() + 1 + word.len() > COLUMNS {
+            lines += &line;
+            lines.push('\n');
+            line = String::from("//!");
+        }
+        line.push(' ');
+        line += word;
+    }
+    lines + &line + "\n"
 }
 
 fn table(analysis: &Analysis) -> String {

@@ -13,6 +13,20 @@ use std::marker::PhantomData;
 
 /// Trajectories of scenarios from their initial states, under the mean of their dither from the
 /// start.
+///
+/// ```
+/// use engine::taylor::{Ensemble, Observables, Span};
+///
+/// let mut still = shared_model::Scenario::reconstruction();
+/// still.run.sideslip_rad = 0.0;
+/// still.run.steering_angle_rad = 0.0;
+/// still.steering.motor_current_a = 0.0;
+/// let span = Span { time_s: 10.0, tolerance: 1e-10, observables: Observables::default(), warm_up_s: 0.0, segments: 0 };
+/// let found = Ensemble::new(&[still])?.integrate::<0>(&span);
+/// // Without the motor's torque, straight ahead is an equilibrium.
+/// assert_eq!(<[f64; 4]>::from(found[0].end.x), [0.0; 4]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Ensemble {
     tasks: Vec<Task>,
