@@ -9,6 +9,7 @@ pub mod bus;
 pub mod can;
 pub mod configuration;
 pub mod controller;
+pub mod delayed_feedback;
 pub mod diagnostic;
 pub mod dither;
 pub mod e2e;

@@ -247,7 +247,7 @@ fn configurations_are_complete_and_read_back() {
     }
 }
 
-const COMMANDS: [&str; 24] = [
+const COMMANDS: [&str; 26] = [
     "verify",
     "pil",
     "simulate",
@@ -256,7 +256,9 @@ const COMMANDS: [&str; 24] = [
     "averaging",
     "convergence",
     "orbit",
+    "continue",
     "regions",
+    "feedback",
     "equilibria",
     "basin",
     "phase",

@@ -64,6 +64,7 @@ fn sigterm_ends_every_long_job() {
         &["continue", "--transient", "100000", "--out", "branches.csv"],
         &["regions", "--time", "400000", "--out", "regions.csv"],
         &["basin", "--time", "400000", "--out", "basin.csv"],
+        &["feedback", "--time", "100000", "--out", "feedback.csv"],
         &["phase", "--transient", "100000", "--out", "phase.csv"],
         &["poincare", "--time", "400000", "--out", "section.csv"],
         &[

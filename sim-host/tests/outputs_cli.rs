@@ -10,7 +10,7 @@ use std::process::Stdio;
 
 /// Each subcommand that writes files, with the options that name them. What they read need not be
 /// there: outputs come first.
-const WRITERS: [(&str, &[&str]); 20] = [
+const WRITERS: [(&str, &[&str]); 22] = [
     ("simulate", &["--out"]),
     ("lyapunov", &["--out", "--json", "--figure"]),
     (
@@ -22,6 +22,8 @@ const WRITERS: [(&str, &[&str]); 20] = [
     ("regions", &["--out", "--json", "--figure"]),
     ("equilibria", &["--out", "--json", "--figure"]),
     ("basin", &["--out", "--json", "--figure"]),
+    ("continue", &["--out", "--json", "--figure"]),
+    ("feedback", &["--out", "--json", "--figure"]),
     ("phase", &["--out", "--json", "--figure"]),
     ("poincare", &["--out", "--json", "--figure"]),
     ("spectrum", &["--out", "--json", "--figure"]),

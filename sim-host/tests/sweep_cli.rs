@@ -68,6 +68,8 @@ fn ranges_are_checked() {
     assert_refused("basin --over speed --from 1600", &["--to", "--step"]);
     assert_refused("basin --from 1600 --to 1700 --step 50", &["--over"]);
     assert_refused(
+        "feedback --from 1700 --to 1740 --step 40 --free 20 --time 60 --noise 0.01",
+        "feedback --from 1700 --region --gain-from 4 --gain-to 6 --gain-step 2 --free 20 --time 60",
         "basin --over speed --from 1600 --to 1700 --step 0",
         &["in steps of 0"],
     );
@@ -80,6 +82,26 @@ fn ranges_are_checked() {
         &["in steps of 0"],
     );
     assert_refused("equilibria --from 1000", &["--to"]);
+    for (option, parts) in [
+        ("--memory 1", &["--memory 1", "less than 1"][..]),
+        ("--memory nan", &["--memory NaN"]),
+        ("--limit -1", &["--limit -1", "from 0 to 1000 N m"]),
+        ("--delay-error 1", &["--delay-error 1", "-0.5 to 0.5 s"]),
+        ("--adaptation -1", &["--adaptation -1", "from 0 to"]),
+        ("--noise nan", &["--noise NaN"]),
+        ("--free 0", &["--free 0", "from 10 to"]),
+        ("--time inf", &["--time inf", "from 60 to"]),
+        ("--latency 101", &["--latency", "101"]),
+        ("--gain-step 0", &["in steps of 0"]),
+        ("--gain-step 1e-4", &["must be at most 1000"]),
+        ("--signal mass", &["mass", "yaw_rate"]),
+        ("--region --delay-error 0", &["greater than 0"]),
+        ("--from 0", &["run.wheel_speed_rpm = 0"]),
+        ("--from 300 --to 310 --step 10", &["no orbit of one cycle"]),
+        ("--plant missing.toml", &["missing.toml"]),
+    ] {
+        assert_refused(&format!("feedback {option}"), parts);
+    }
     assert_refused("equilibria --rpm 1750 --time 10", &["--time 10"]);
     assert_refused("equilibria --rpm 0", &["run.wheel_speed_rpm = 0"]);
 }
@@ -106,6 +128,8 @@ fn the_number_of_threads_does_not_change_the_bytes() {
         "regions --from 1600 --to 1660 --step 20 --width 5 --transient 20 --time 100",
         "equilibria --from 1600 --to 1700",
         "basin --beta-step 0.2 --delta-step 0.4 --transient 20 --time 60",
+        "feedback --from 1700 --to 1740 --step 40 --free 20 --time 60 --noise 0.01",
+        "feedback --from 1700 --region --gain-from 4 --gain-to 6 --gain-step 2 --free 20 --time 60",
         "basin --over speed --from 1600 --to 1700 --step 100 --beta-step 0.2 --delta-step 0.4 --transient 20 --time 60",
     ]
     .into_iter()

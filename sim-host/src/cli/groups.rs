@@ -53,6 +53,10 @@ const GROUPS: [Group; 4] = [
                 "basin",
                 "basins of attraction over a grid of initial states",
             ),
+            (
+                "feedback",
+                "unstable orbits held by delayed feedback of a sensor",
+            ),
             ("phase", "phase portrait after the transient"),
             ("poincare", "Poincar\u{e9} section"),
             ("spectrum", "power spectrum by Welch's method"),

@@ -12,6 +12,7 @@ mod convergence;
 mod emulator;
 mod equilibria;
 mod faults;
+mod feedback;
 mod firmware;
 mod grid;
 mod groups;
@@ -71,6 +72,7 @@ enum Command {
     Regions(regions::Arguments),
     Equilibria(equilibria::Arguments),
     Basin(basin::Arguments),
+    Feedback(feedback::Arguments),
     Phase(phase::Arguments),
     Poincare(poincare::Arguments),
     Spectrum(spectrum::Arguments),
@@ -138,6 +140,7 @@ fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Regions(arguments) => regions::run(&arguments),
         Command::Equilibria(arguments) => equilibria::run(&arguments),
         Command::Basin(arguments) => basin::run(&arguments),
+        Command::Feedback(arguments) => feedback::run(&arguments),
         Command::Phase(arguments) => phase::run(&arguments),
         Command::Poincare(arguments) => poincare::run(&arguments),
         Command::Spectrum(arguments) => spectrum::run(&arguments),

@@ -9,6 +9,7 @@ pub mod component;
 pub mod config;
 pub mod convergence;
 mod decimal;
+pub mod delayed_feedback;
 pub mod eigenvalues;
 pub mod equilibria;
 pub mod extrema;

@@ -31,7 +31,7 @@ pub enum Parameter {
 
 impl Parameter {
     /// Name as in a configuration file.
-    pub fn key(self) -> &'static str {
+    pub const fn key(self) -> &'static str {
         match self {
             Self::Speed => "run.wheel_speed_rpm",
             Self::Amplitude => "dither.amplitude_v",

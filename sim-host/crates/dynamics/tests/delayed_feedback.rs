@@ -1,0 +1,127 @@
+//! Delayed feedback: multipliers by power iteration against continuation and simulation.
+
+use dynamics::component::Component;
+use dynamics::delayed_feedback::{Conditions, Feedback, Linearised, simulate};
+use shared_model::Scenario;
+
+const CONDITIONS: Conditions = Conditions {
+    free_s: 100.0,
+    time_s: 300.0,
+    noise: 0.0,
+};
+
+fn at(rpm: f64) -> (Scenario<f64>, Linearised) {
+    let mut scenario = Scenario::reconstruction();
+    scenario.run.wheel_speed_rpm = rpm;
+    let orbit = Linearised::of(&scenario).expect("there is an orbit of one cycle");
+    (scenario, orbit)
+}
+
+fn feedback(orbit: &Linearised, gain: f64) -> Feedback {
+    Feedback {
+        component: Component::YAW_RATE,
+        gain,
+        delay_s: orbit.period_s,
+        memory: 0.0,
+        limit_nm: 8.0,
+        adaptation: 0.0,
+        latency_ticks: 0,
+    }
+}
+
+/// Without gain the fixed-step map along the orbit has the multiplier that shooting finds by another integrator.
+#[test]
+fn without_gain_the_multiplier_is_that_of_the_orbit() {
+    for rpm in [1700.0, 1750.0, 1800.0] {
+        let (_, orbit) = at(rpm);
+        let found = orbit.greatest_multiplier(&feedback(&orbit, 0.0));
+        let free = orbit.free_multiplier.abs();
+        // The instants of stick and slip, by linear interpolation in steps of 0.1 ms.
+        assert!((found / free - 1.0).abs() < 2e-3, "{rpm}: {found} {free}");
+    }
+}
+
+/// The torque of a simulation falls from period to period by the multiplier.
+#[test]
+fn a_simulation_decays_by_the_multiplier() {
+    let (scenario, orbit) = at(1750.0);
+    // Slowly enough to be measured before the error of the interpolated delay is all that is left.
+    let feedback = feedback(&orbit, 3.5);
+    let multiplier = orbit.greatest_multiplier(&feedback);
+    let peak_nm = |periods: f64| {
+        let conditions = Conditions {
+            free_s: 50.0,
+            time_s: 70.0 + periods * orbit.period_s,
+            noise: 0.0,
+        };
+        // That at the begin of the last minute.
+        simulate(&scenario, &feedback, &conditions).torque_peak_nm
+    };
+    let (first, last) = (10.0, 50.0);
+    let measured = (peak_nm(last) / peak_nm(first)).powf(1.0 / (last - first));
+    assert!((0.9..1.0).contains(&multiplier), "{multiplier}");
+    assert!(
+        (measured - multiplier).abs() < 5e-4,
+        "{measured} {multiplier}"
+    );
+}
+
+/// Below the least holding gain the simulation stays chaotic, above it is held with hardly any torque.
+#[test]
+fn the_least_gain_divides_held_from_chaotic() {
+    let (scenario, orbit) = at(1750.0);
+    for (gain, is_held) in [(2.5, false), (4.5, true), (6.0, true)] {
+        let feedback = feedback(&orbit, gain);
+        assert_eq!(
+            orbit.greatest_multiplier(&feedback) < 1.0,
+            is_held,
+            "{gain}"
+        );
+        let held = simulate(&scenario, &feedback, &CONDITIONS);
+        assert_eq!(held.capture_s.is_some(), is_held, "{gain}: {held:?}");
+        assert_eq!(held.torque_rms_nm < 1e-3, is_held, "{gain}: {held:?}");
+        // The held orbit is as large as the chaotic motion.
+        let (low, high) = held.yaw_rates_rad_per_s;
+        assert!(high - low > 2.0, "{held:?}");
+    }
+}
+
+/// The torque that an error of the delay leaves is gone after the delay has adapted.
+#[test]
+fn the_delay_adapts_to_the_period_of_the_orbit() {
+    let (scenario, orbit) = at(1750.0);
+    let wrong = Feedback {
+        delay_s: orbit.period_s + 0.01,
+        ..feedback(&orbit, 6.0)
+    };
+    let stays = simulate(&scenario, &wrong, &CONDITIONS);
+    assert!((0.3..1.0).contains(&stays.torque_rms_nm), "{stays:?}");
+    let adapting = Feedback {
+        adaptation: 1.0,
+        ..wrong
+    };
+    let adapted = simulate(&scenario, &adapting, &CONDITIONS);
+    assert!(adapted.torque_rms_nm < 1e-3, "{adapted:?}");
+    assert!(
+        (adapted.delay_s - orbit.period_s).abs() < 1e-4,
+        "{adapted:?}"
+    );
+}
+
+/// No torque, no hold; the limit is kept.
+#[test]
+fn the_limit_is_kept() {
+    let (scenario, orbit) = at(1750.0);
+    for limit_nm in [0.0, 2.0] {
+        let limited = Feedback {
+            limit_nm,
+            ..feedback(&orbit, 2.0)
+        };
+        let held = simulate(&scenario, &limited, &CONDITIONS);
+        assert!(held.torque_peak_nm <= limit_nm, "{held:?}");
+        assert!(
+            limit_nm == 0.0 || held.torque_peak_nm == limit_nm,
+            "{held:?}"
+        );
+    }
+}

@@ -1,0 +1,450 @@
+//! `sim-host feedback`: unstable orbits held by delayed feedback through the motor.
+
+use super::options::{ConfigOptions, load_file};
+use super::outcome::Outcome;
+use super::output::{Destinations, named};
+use super::sweep::{check_interrupted, with_progress};
+use anyhow::{bail, ensure};
+use dynamics::component::Component;
+use dynamics::config::validate;
+use dynamics::delayed_feedback::{
+    Cell, Conditions, Feedback, Plan, Point, chart, over_speed, region, region_chart,
+};
+use dynamics::sweep::{Parameter, SweepError, Values};
+use dynamics::words::Short;
+use serde::Serialize;
+use shared_model::Scenario;
+use std::path::PathBuf;
+
+/// Hold the unstable orbit of one cycle by delayed feedback of a sensor through the motor, without
+/// dither.
+///
+/// The torque K (y(t - T) - y(t)) is added to the motor's constant one at the control rate, T being the
+/// period of the orbit. At each speed the orbit is computed, the gain K with the least multiplier is
+/// chosen from those tried, and the trajectory from the scenario's initial state is simulated, the
+/// feedback being switched on after --free. The torque is about the steering axis.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sim-host feedback --from 1650 --to 1750 --step 50
+  sim-host feedback --step 40 --out feedback.csv --figure feedback.svg
+  sim-host feedback --from 1750 --to 1750 --delay-error 0.01 --adaptation 1
+  sim-host feedback --from 1750 --to 1750 --noise 0.01 --latency 2    # robustness
+  sim-host feedback --from 1750 --region --gain-from 2 --gain-to 12 --gain-step 2 --time 100 \\
+      --out region.csv --figure region.svg
+  sim-host feedback --from 1750 --to 1750 --signal steering_angle --gain-from -100 \\
+      --gain-to 100 --gain-step 5")]
+pub struct Arguments {
+    #[command(flatten)]
+    config: ConfigOptions,
+    /// First wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 1640.0,
+        allow_negative_numbers = true
+    )]
+    from: f64,
+    /// Last wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 2000.0,
+        allow_negative_numbers = true
+    )]
+    to: f64,
+    /// Step of the wheel speed, rpm
+    #[arg(
+        long,
+        value_name = "RPM",
+        default_value_t = 40.0,
+        allow_negative_numbers = true
+    )]
+    step: f64,
+    /// Signal that is fed back
+    #[arg(long, value_name = "COMPONENT", default_value = "yaw_rate")]
+    signal: Component,
+    /// Least gain tried, N m s/rad for rates, N m/rad for angles
+    #[arg(
+        long,
+        value_name = "GAIN",
+        default_value_t = 0.5,
+        allow_negative_numbers = true
+    )]
+    gain_from: f64,
+    /// Greatest gain tried
+    #[arg(
+        long,
+        value_name = "GAIN",
+        default_value_t = 12.0,
+        allow_negative_numbers = true
+    )]
+    gain_to: f64,
+    /// Step of the gain
+    #[arg(
+        long,
+        value_name = "GAIN",
+        default_value_t = 0.5,
+        allow_negative_numbers = true
+    )]
+    gain_step: f64,
+    /// Weight of a past period relative to the one after it, from 0 to less than 1
+    #[arg(
+        long,
+        value_name = "SHARE",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    memory: f64,
+    /// Greatest torque either way, N m
+    #[arg(
+        long,
+        value_name = "NM",
+        default_value_t = 8.0,
+        allow_negative_numbers = true
+    )]
+    limit: f64,
+    /// Error of the delay in the simulation, s [default: 0; with --region the greatest, 0.02]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    delay_error: Option<f64>,
+    /// Rate at which the delay adapts to the orbit's period, ticks per square of the signal's unit
+    #[arg(
+        long,
+        value_name = "RATE",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    adaptation: f64,
+    /// Control ticks from the measurement to the torque, beside the one in which it is computed
+    #[arg(long, value_name = "TICKS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=100))]
+    latency: u32,
+    /// Standard deviation of the sensor's noise in the simulation, in the signal's unit
+    #[arg(
+        long,
+        value_name = "DEVIATION",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    noise: f64,
+    /// TOML file of the vehicle that is simulated; orbits, delays and gains are those of the scenario
+    /// [default: the scenario]
+    #[arg(long, value_name = "FILE")]
+    plant: Option<PathBuf>,
+    /// At the first speed, simulate all gains and 21 errors of the delay, up to --delay-error either
+    /// way
+    #[arg(long)]
+    region: bool,
+    /// Time before the feedback is switched on, s
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 100.0,
+        allow_negative_numbers = true
+    )]
+    free: f64,
+    /// Time with it, of which the torque of the last minute is reported, s
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value_t = 300.0,
+        allow_negative_numbers = true
+    )]
+    time: f64,
+    #[command(flatten)]
+    destinations: Destinations,
+}
+
+/// Gains tried at each speed.
+const MOST_GAINS: usize = 1000;
+/// Times of a simulation, s.
+const FREE_S: std::ops::RangeInclusive<f64> = 10.0..=10_000.0;
+const TIME_S: std::ops::RangeInclusive<f64> = 60.0..=100_000.0;
+/// Torque limits, N m: the motor's is 16 N m.
+const LIMIT_NM: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
+/// Errors of the delay, s.
+const DELAY_ERROR_S: std::ops::RangeInclusive<f64> = -0.5..=0.5;
+/// Errors of the delay in a region, and the greatest unless told otherwise, s.
+const REGION_ERRORS: usize = 21;
+const REGION_ERROR_S: f64 = 0.02;
+/// Rates of adaptation, ticks per square unit, and deviations of the noise.
+const ADAPTATION: std::ops::RangeInclusive<f64> = 0.0..=1000.0;
+const NOISE: std::ops::RangeInclusive<f64> = 0.0..=10.0;
+
+#[derive(Serialize)]
+struct Results<'a> {
+    signal: Component,
+    memory: f64,
+    limit_nm: f64,
+    delay_error_s: f64,
+    points: &'a [Point],
+}
+
+#[derive(Serialize)]
+struct RegionResults<'a> {
+    signal: Component,
+    wheel_speed_rpm: f64,
+    memory: f64,
+    limit_nm: f64,
+    cells: &'a [Cell],
+}
+
+/// A row of the CSV of a region.
+#[derive(Serialize)]
+struct CellRow {
+    gain: f64,
+    delay_error_s: f64,
+    multiplier: f64,
+    maxima: Option<usize>,
+    torque_rms_nm: f64,
+    torque_peak_nm: f64,
+    capture_s: Option<f64>,
+}
+
+impl From<&Cell> for CellRow {
+    fn from(cell: &Cell) -> Self {
+        Self {
+            gain: cell.gain,
+            delay_error_s: cell.delay_error_s,
+            multiplier: cell.multiplier,
+            maxima: cell.held.maxima,
+            torque_rms_nm: cell.held.torque_rms_nm,
+            torque_peak_nm: cell.held.torque_peak_nm,
+            capture_s: cell.held.capture_s,
+        }
+    }
+}
+
+/// A row of the CSV.
+#[derive(Serialize)]
+struct Row {
+    wheel_speed_rpm: f64,
+    period_s: f64,
+    free_multiplier: f64,
+    gain: f64,
+    multiplier: f64,
+    least_holding_gain: Option<f64>,
+    greatest_holding_gain: Option<f64>,
+    maxima: Option<usize>,
+    torque_rms_nm: f64,
+    torque_peak_nm: f64,
+    capture_s: Option<f64>,
+    yaw_rate_min_rad_per_s: f64,
+    yaw_rate_max_rad_per_s: f64,
+}
+
+impl From<&Point> for Row {
+    fn from(point: &Point) -> Self {
+        let (best, held) = (&point.best, &point.held);
+        Self {
+            wheel_speed_rpm: point.wheel_speed_rpm,
+            period_s: point.period_s,
+            free_multiplier: point.free_multiplier,
+            gain: best.gain,
+            multiplier: best.multiplier,
+            least_holding_gain: best.holding.map(|range| range.0),
+            greatest_holding_gain: best.holding.map(|range| range.1),
+            maxima: held.maxima,
+            torque_rms_nm: held.torque_rms_nm,
+            torque_peak_nm: held.torque_peak_nm,
+            capture_s: held.capture_s,
+            yaw_rate_min_rad_per_s: held.yaw_rates_rad_per_s.0,
+            yaw_rate_max_rad_per_s: held.yaw_rates_rad_per_s.1,
+        }
+    }
+}
+
+impl Arguments {
+    fn plan(&self) -> anyhow::Result<Plan> {
+        for (option, value, allowed, unit) in [
+            ("--limit", self.limit, &LIMIT_NM, "N m"),
+            ("--delay-error", self.delay_error(), &DELAY_ERROR_S, "s"),
+            (
+                "--adaptation",
+                self.adaptation,
+                &ADAPTATION,
+                "ticks per square unit",
+            ),
+            ("--noise", self.noise, &NOISE, "of the signal's unit"),
+            ("--free", self.free, &FREE_S, "s"),
+            ("--time", self.time, &TIME_S, "s"),
+        ] {
+            ensure!(
+                allowed.contains(&value),
+                "{option} {}: must be from {} to {} {unit}",
+                Short(value),
+                allowed.start(),
+                allowed.end()
+            );
+        }
+        ensure!(
+            (0.0..1.0).contains(&self.memory),
+            "--memory {}: must be from 0 to less than 1",
+            Short(self.memory)
+        );
+        let gains = Values::new("gain", self.gain_from, self.gain_to, self.gain_step)?;
+        ensure!(
+            gains.count() <= MOST_GAINS,
+            "--gain-from {} --gain-to {} --gain-step {}: {} gains, must be at most {MOST_GAINS}",
+            Short(self.gain_from),
+            Short(self.gain_to),
+            Short(self.gain_step),
+            gains.count()
+        );
+        Ok(Plan {
+            feedback: Feedback {
+                component: self.signal,
+                // Both are chosen at each speed.
+                gain: 0.0,
+                delay_s: 0.0,
+                memory: self.memory,
+                limit_nm: self.limit,
+                adaptation: self.adaptation,
+                latency_ticks: self.latency as usize,
+            },
+            gains,
+            delay_error_s: self.delay_error(),
+            conditions: Conditions {
+                free_s: self.free,
+                time_s: self.time,
+                noise: self.noise,
+            },
+        })
+    }
+
+    fn delay_error(&self) -> f64 {
+        let usual = if self.region { REGION_ERROR_S } else { 0.0 };
+        self.delay_error.unwrap_or(usual)
+    }
+
+    /// The vehicle that is simulated.
+    fn plant(&self, scenario: &Scenario<f64>) -> anyhow::Result<Scenario<f64>> {
+        let Some(file) = &self.plant else {
+            return Ok(*scenario);
+        };
+        let plant = load_file(file, self.config.preset.as_deref())?;
+        validate(&plant)?;
+        Ok(plant)
+    }
+}
+
+pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
+    let scenario = arguments.config.load()?;
+    validate(&scenario)?;
+    let plan = arguments.plan()?;
+    let (from, to) = (arguments.from, arguments.to);
+    let speeds = Values::new(Parameter::Speed.name(), from, to, arguments.step)?;
+    let plant = arguments.plant(&scenario)?;
+    let inputs = arguments
+        .config
+        .input()
+        .into_iter()
+        .chain(named("--plant", &arguments.plant));
+    arguments.destinations.check(inputs)?;
+    if arguments.region {
+        return over_delay(arguments, &scenario, &plan, &plant);
+    }
+    let begun = with_progress(speeds.count(), |control| {
+        over_speed(&scenario, &speeds, &plan, &plant, control)
+    })?;
+    let points: Vec<Point> = begun.iter().flatten().cloned().collect();
+    if points.is_empty() {
+        bail!("no orbit of one cycle was found at any speed from {from} to {to} rpm");
+    }
+    let results = Results {
+        signal: arguments.signal,
+        memory: arguments.memory,
+        limit_nm: arguments.limit,
+        delay_error_s: plan.delay_error_s,
+        points: &points,
+    };
+    arguments
+        .destinations
+        .write(points.iter().map(Row::from), &results, || {
+            chart(&points).svg()
+        })?;
+    show(&points);
+    if points.len() < begun.len() {
+        say!(
+            "no orbit of one cycle at {} of {} speeds",
+            begun.len() - points.len(),
+            begun.len()
+        );
+    }
+    check_interrupted(begun.len(), speeds.count())?;
+    Ok(Outcome::Success)
+}
+
+/// The region of gain and delay at one speed.
+fn over_delay(
+    arguments: &Arguments,
+    scenario: &Scenario<f64>,
+    plan: &Plan,
+    plant: &Scenario<f64>,
+) -> anyhow::Result<Outcome> {
+    let rpm = arguments.from;
+    let [scenario, plant] = [scenario, plant].map(|one| Parameter::Speed.set(one, rpm));
+    validate(&scenario)?;
+    let error_s = plan.delay_error_s.abs();
+    ensure!(
+        error_s > 0.0,
+        "--region --delay-error 0: must be greater than 0"
+    );
+    let errors = Values::between("error of the delay (s)", -error_s, error_s, REGION_ERRORS)?;
+    let all = errors.count() * plan.gains.count();
+    let cells = with_progress(all, |control| {
+        Ok::<_, SweepError>(region(&scenario, plan, &errors, &plant, control))
+    })?;
+    let Some(cells) = cells else {
+        bail!("no orbit of one cycle was found at {rpm} rpm");
+    };
+    let results = RegionResults {
+        signal: arguments.signal,
+        wheel_speed_rpm: rpm,
+        memory: arguments.memory,
+        limit_nm: arguments.limit,
+        cells: &cells,
+    };
+    arguments
+        .destinations
+        .write(cells.iter().map(CellRow::from), &results, || {
+            region_chart(&cells, &plan.feedback, rpm).svg()
+        })?;
+    let periodic = cells.iter().filter(|cell| cell.held.maxima.is_some());
+    say!(
+        "{rpm} rpm: periodic at {} of {} pairs of gain and delay",
+        periodic.count(),
+        cells.len()
+    );
+    check_interrupted(cells.len(), all)?;
+    Ok(Outcome::Success)
+}
+
+fn show(points: &[Point]) {
+    say!(
+        "speed  period    multiplier      gain   gains that hold  torque (N m)      maxima  captured"
+    );
+    say!(
+        "rpm    s         free     held            from    to      rms      peak             after s"
+    );
+    for point in points {
+        let (best, held) = (&point.best, &point.held);
+        let (low, high) = best
+            .holding
+            .map_or(("-".into(), "-".into()), |(low, high)| {
+                (format!("{low}"), format!("{high}"))
+            });
+        say!(
+            "{:<6} {:.6}  {:<8.3} {:<6.3} {:>6}   {low:<7} {high:<7} {:<8.4} {:<8.4} {:<7} {}",
+            point.wheel_speed_rpm,
+            point.period_s,
+            point.free_multiplier,
+            best.multiplier,
+            best.gain,
+            held.torque_rms_nm,
+            held.torque_peak_nm,
+            held.maxima
+                .map_or("none".into(), |maxima| maxima.to_string()),
+            held.capture_s
+                .map_or("no".into(), |seconds| format!("{seconds:.0}"))
+        );
+    }
+}
