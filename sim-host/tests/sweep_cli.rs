@@ -68,8 +68,6 @@ fn ranges_are_checked() {
     assert_refused("basin --over speed --from 1600", &["--to", "--step"]);
     assert_refused("basin --from 1600 --to 1700 --step 50", &["--over"]);
     assert_refused(
-        "feedback --from 1700 --to 1740 --step 40 --free 20 --time 60 --noise 0.01",
-        "feedback --from 1700 --region --gain-from 4 --gain-to 6 --gain-step 2 --free 20 --time 60",
         "basin --over speed --from 1600 --to 1700 --step 0",
         &["in steps of 0"],
     );

@@ -11,7 +11,7 @@ use crate::{process, rustup, workspace};
 
 /// The readers (`fuzz/src/lib.rs`), and the default number of inputs of each: ten million where one
 /// takes microseconds, the number for some ten minutes where it takes longer.
-const TARGETS: [(&str, u64); 12] = [
+const TARGETS: [(&str, u64); 11] = [
     ("telemetry", 10_000_000),
     ("recording", 1_000_000),
     ("tile", 10_000_000),

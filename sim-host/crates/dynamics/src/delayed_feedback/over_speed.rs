@@ -1,0 +1,74 @@
+//! What a feedback does at each wheel speed.
+
+use super::feedback::{Feedback, Plan};
+use super::linearised::{Best, Linearised};
+use super::orbit::{branch_over_speed, orbit_on};
+use super::simulation::{Held, simulate};
+use crate::sweep::{Parameter, RunControl, SweepError, Values, scenarios};
+use shared_model::Scenario;
+
+/// How far the branch of orbits is followed beyond the speeds, rpm.
+const BEYOND_RPM: f64 = 1.0;
+
+/// What a feedback does at one wheel speed.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Point {
+    /// Wheel speed N, rpm.
+    pub wheel_speed_rpm: f64,
+    /// Period of the orbit of one cycle, s.
+    pub period_s: f64,
+    /// Its multiplier of greatest modulus without feedback, beside 1.
+    pub free_multiplier: f64,
+    /// The best gain.
+    pub best: Best,
+    /// The trajectory from the scenario's start under the best gain.
+    pub held: Held,
+}
+
+/// Orbits, best gains and simulations over the wheel speed, each with the orbit's own period as delay. `plant` is
+/// the vehicle that is simulated, which may be another than the scenario, whose orbits give delay and gain; `None`
+/// at a speed where no orbit of one cycle is found. Speeds that were not begun before a request to stop are left
+/// out.
+///
+/// # Errors
+/// If a scenario is not valid.
+pub fn over_speed(
+    scenario: &Scenario<f64>,
+    speeds_rpm: &Values,
+    plan: &Plan,
+    plant: &Scenario<f64>,
+    control: RunControl,
+) -> Result<Vec<Option<Point>>, SweepError> {
+    let scenarios = scenarios(scenario, Parameter::Speed, speeds_rpm)?;
+    let (first, last) = scenarios
+        .iter()
+        .fold((f64::INFINITY, 0.0_f64), |(low, high), one| {
+            let rpm = one.run.wheel_speed_rpm;
+            (low.min(rpm), high.max(rpm))
+        });
+    let range = (first - BEYOND_RPM, last + BEYOND_RPM);
+    let plant =
+        |scenario: &Scenario<f64>| Parameter::Speed.set(plant, scenario.run.wheel_speed_rpm);
+    let branch = interrupt::catch(|| branch_over_speed(&scenarios, range)).unwrap_or_default();
+    let points = control.points(&scenarios, |scenario| {
+        let orbit = Linearised::at(scenario, &orbit_on(&branch, scenario)?)?;
+        let delayed = Feedback {
+            delay_s: orbit.period_s,
+            ..plan.feedback
+        };
+        let best = orbit.best_gain(&delayed, &plan.gains);
+        let feedback = Feedback {
+            gain: best.gain,
+            delay_s: orbit.period_s + plan.delay_error_s,
+            ..delayed
+        };
+        Some(Point {
+            wheel_speed_rpm: scenario.run.wheel_speed_rpm,
+            period_s: orbit.period_s,
+            free_multiplier: orbit.free_multiplier,
+            best,
+            held: simulate(&plant(scenario), &feedback, &plan.conditions),
+        })
+    });
+    Ok(points.into_iter().flatten().collect())
+}

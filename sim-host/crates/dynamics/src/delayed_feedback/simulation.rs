@@ -1,0 +1,122 @@
+//! A trajectory under feedback.
+
+use super::feedback::{Conditions, Feedback};
+use super::vehicle::{steps_per_tick, undithered};
+use crate::period::{TOLERANCE, maxima_of_turns, period_of_maxima};
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
+use shared_model::delayed_feedback::DelayedFeedback;
+use shared_model::dither::Injection;
+use shared_model::vehicle::YAW_RATE;
+use shared_model::{Scenario, integrate};
+use std::collections::VecDeque;
+
+/// Ticks of the delay line: 8 s at a control rate of 1 kHz.
+const LINE: usize = 8192;
+/// Greatest torque of a trajectory that is held, N m; at most half of the limit.
+const HELD_NM: f64 = 0.5;
+/// Part of a simulation at its end from which the torque is taken, s.
+const JUDGED_S: f64 = 60.0;
+/// Seed of the sensor's noise.
+const NOISE_SEED: u64 = 20_071;
+
+/// A trajectory under feedback.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Held {
+    /// Root mean square of the torque over the last minute, N m.
+    pub torque_rms_nm: f64,
+    /// Its greatest magnitude over the last minute, N m.
+    pub torque_peak_nm: f64,
+    /// Time from switching on until the torque stays below 0.5 N m and half of its limit, s; none if it does not.
+    pub capture_s: Option<f64>,
+    /// Maxima of the yaw rate in a cycle over the last minute; none if they do not repeat.
+    pub maxima: Option<usize>,
+    /// The delay at the end, s.
+    pub delay_s: f64,
+    /// Least and greatest yaw rate over the last minute, rad/s.
+    pub yaw_rates_rad_per_s: (f64, f64),
+}
+
+/// The trajectory of a vehicle without dither, the feedback being computed at the control rate and switched on after
+/// a while. The torque is held over a control tick.
+pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditions) -> Held {
+    let rate_hz = plant.run.control_rate_hz;
+    let tick_s = 1.0 / rate_hz;
+    let steps = steps_per_tick(plant);
+    let step_s = tick_s / f64::from(steps);
+    let (mut model, constant_nm) = undithered(plant);
+    let mut state = model.initial_state(plant);
+    let mut law = DelayedFeedback::<f64, LINE>::new(feedback.law(tick_s));
+    let mut noise = Noise::new(conditions.noise);
+    let mut torques_nm: VecDeque<f64> = std::iter::repeat_n(0.0, feedback.latency_ticks).collect();
+    let ticks = |time_s: f64| (time_s * rate_hz) as u64;
+    let free = ticks(conditions.free_s);
+    let all = free + ticks(conditions.time_s);
+    let judged = all.saturating_sub(ticks(JUDGED_S));
+    let index = feedback.component.index;
+    let held_nm = HELD_NM.min(0.5 * feedback.limit_nm);
+    let (mut squares, mut peak_nm, mut last_great) = (0.0, 0.0_f64, free);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut turns = Vec::new();
+    let mut last = (state.x[YAW_RATE], 0.0);
+    for tick in 0..all {
+        interrupt::check();
+        if tick == free {
+            // The line is full; what it has adapted to in chaos is none of the orbit's.
+            law.restart();
+        }
+        let wanted_nm = law.run(state.x[index] + noise.next());
+        // The line fills before it is switched on.
+        torques_nm.push_back(if tick < free { 0.0 } else { wanted_nm });
+        let torque_nm = torques_nm.pop_front().unwrap_or(0.0);
+        model.set_motor_torque_nm(constant_nm + torque_nm);
+        for _ in 0..steps {
+            integrate::step(&model, &mut state, step_s, Injection::Off);
+        }
+        if torque_nm.abs() > held_nm {
+            last_great = tick;
+        }
+        if tick >= judged {
+            squares += torque_nm * torque_nm;
+            peak_nm = peak_nm.max(torque_nm.abs());
+            low = low.min(state.x[YAW_RATE]);
+            high = high.max(state.x[YAW_RATE]);
+        }
+        let change = state.x[YAW_RATE] - last.0;
+        if tick > judged && change * last.1 < 0.0 {
+            turns.push((tick as f64 * tick_s, last.0));
+        }
+        last = (state.x[YAW_RATE], change);
+    }
+    let range = high - low;
+    let maxima = maxima_of_turns(&turns, range);
+    Held {
+        torque_rms_nm: (squares / (all - judged).max(1) as f64).sqrt(),
+        torque_peak_nm: peak_nm,
+        capture_s: (last_great < judged).then(|| (last_great - free) as f64 * tick_s),
+        maxima: period_of_maxima(&maxima, range, TOLERANCE).maxima(),
+        delay_s: law.delay_ticks() * tick_s,
+        yaw_rates_rad_per_s: (low, high),
+    }
+}
+
+/// Normal noise, the same in every run.
+struct Noise {
+    distribution: Option<Normal<f64>>,
+    generator: Pcg64,
+}
+
+impl Noise {
+    fn new(deviation: f64) -> Self {
+        Self {
+            distribution: Normal::new(0.0, deviation).ok().filter(|_| deviation > 0.0),
+            generator: Pcg64::seed_from_u64(NOISE_SEED),
+        }
+    }
+
+    fn next(&mut self) -> f64 {
+        let drawn = |distribution: &Normal<f64>| distribution.sample(&mut self.generator);
+        self.distribution.as_ref().map_or(0.0, drawn)
+    }
+}
