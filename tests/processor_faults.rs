@@ -14,9 +14,13 @@ use rayon::prelude::*;
 use shared_model::frame::decode_actuation;
 use shared_model::signal::Mode;
 use std::collections::BTreeSet;
-use tests::{TIME_OUT, image};
+use std::time::Duration;
+use tests::image;
 
 const TICK: u32 = BENCH_TICKS.start;
+/// Without an answer for so long, the ECU has stopped sending. An answer takes some milliseconds, and one flip is
+/// judged by this time.
+const STALLED: Duration = Duration::from_secs(15);
 /// Flips in each region.
 const FLIPS: usize = 5;
 
@@ -25,7 +29,7 @@ fn target() -> Target {
         image: image("bench"),
         machine: Machine::Mps2An386,
         link: LinkKind::Timed,
-        time_out: TIME_OUT,
+        time_out: STALLED,
     }
 }
 

@@ -120,7 +120,7 @@ impl<T: Real, const N: usize> DelayedFeedback<T, N> {
         }
     }
 
-    /// Begins anew with the law's delay; the line keeps its values.
+    /// Begins again with the law's delay; the line keeps its values.
     pub fn restart(&mut self) {
         self.delay_ticks = self.law.delay_ticks;
     }

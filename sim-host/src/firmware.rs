@@ -8,7 +8,7 @@ pub const PRIORITIES: [Priority; 6] = [
     priority("main program", &["Reset"]),
     priority("control task", &["PendSV"]),
     priority("PWM interrupt", &["SysTick"]),
-    priority("UART", &["DefaultHandler"]),
+    priority("bus interrupt", &["DefaultHandler"]),
     // HardFault itself moves the stack pointer back to the top; this is counted all the same as if
     // it lay below the others.
     priority("hard fault", &["end_hard_fault"]),

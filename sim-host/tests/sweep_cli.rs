@@ -127,7 +127,7 @@ fn the_number_of_threads_does_not_change_the_bytes() {
         "equilibria --from 1600 --to 1700",
         "basin --beta-step 0.2 --delta-step 0.4 --transient 20 --time 60",
         "feedback --from 1700 --to 1740 --step 40 --free 20 --time 60 --noise 0.01",
-        "feedback --from 1700 --region --gain-from 4 --gain-to 6 --gain-step 2 --free 20 --time 60",
+        "feedback --from 1700 --to 1700 --region --gain-from 4 --gain-to 6 --gain-step 2 --free 20 --time 60",
         "basin --over speed --from 1600 --to 1700 --step 100 --beta-step 0.2 --delta-step 0.4 --transient 20 --time 60",
     ]
     .into_iter()

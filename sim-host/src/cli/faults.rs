@@ -47,8 +47,8 @@ pub struct Arguments {
     /// Firmware image (ELF) for the faults of memory and core; they are omitted without it
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
-    /// Time limit for one answer of the emulator, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 30.0)]
+    /// Time without an answer after which the ECU has stopped sending, s; an answer takes milliseconds
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     time_out: f64,
     #[command(flatten)]
     destinations: Destinations,

@@ -8,9 +8,9 @@ use anyhow::{bail, ensure};
 use dynamics::component::Component;
 use dynamics::config::validate;
 use dynamics::delayed_feedback::{
-    Cell, Conditions, Feedback, Plan, Point, chart, over_speed, region, region_chart,
+    Cell, Conditions, Feedback, Held, Plan, Point, chart, over_speed, region, region_chart,
 };
-use dynamics::sweep::{Parameter, SweepError, Values};
+use dynamics::sweep::{Parameter, SweepError, Values, scenarios};
 use dynamics::words::Short;
 use serde::Serialize;
 use shared_model::Scenario;
@@ -28,11 +28,11 @@ use std::path::PathBuf;
   sim-host feedback --from 1650 --to 1750 --step 50
   sim-host feedback --step 40 --out feedback.csv --figure feedback.svg
   sim-host feedback --from 1750 --to 1750 --delay-error 0.01 --adaptation 1
-  sim-host feedback --from 1750 --to 1750 --noise 0.01 --latency 2    # robustness
-  sim-host feedback --from 1750 --region --gain-from 2 --gain-to 12 --gain-step 2 --time 100 \\
-      --out region.csv --figure region.svg
-  sim-host feedback --from 1750 --to 1750 --signal steering_angle --gain-from -100 \\
-      --gain-to 100 --gain-step 5")]
+  sim-host feedback --from 1750 --to 1750 --noise 0.01 --latency 2
+  sim-host feedback --from 1750 --to 1750 --region --gain-from 2 \\
+      --gain-to 12 --gain-step 2 --time 100 --out region.csv --figure region.svg
+  sim-host feedback --from 1750 --to 1750 --signal steering_angle \\
+      --gain-from -100 --gain-to 100 --gain-step 5")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,
@@ -129,8 +129,7 @@ pub struct Arguments {
     /// [default: the scenario]
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
-    /// At the first speed, simulate all gains and 21 errors of the delay, up to --delay-error either
-    /// way
+    /// At each speed, simulate all gains and 21 errors of the delay, up to --delay-error either way
     #[arg(long)]
     region: bool,
     /// Time before the feedback is switched on, s
@@ -181,7 +180,6 @@ struct Results<'a> {
 #[derive(Serialize)]
 struct RegionResults<'a> {
     signal: Component,
-    wheel_speed_rpm: f64,
     memory: f64,
     limit_nm: f64,
     cells: &'a [Cell],
@@ -190,6 +188,7 @@ struct RegionResults<'a> {
 /// A row of the CSV of a region.
 #[derive(Serialize)]
 struct CellRow {
+    wheel_speed_rpm: f64,
     gain: f64,
     delay_error_s: f64,
     multiplier: f64,
@@ -202,6 +201,7 @@ struct CellRow {
 impl From<&Cell> for CellRow {
     fn from(cell: &Cell) -> Self {
         Self {
+            wheel_speed_rpm: cell.wheel_speed_rpm,
             gain: cell.gain,
             delay_error_s: cell.delay_error_s,
             multiplier: cell.multiplier,
@@ -227,6 +227,9 @@ struct Row {
     torque_rms_nm: f64,
     torque_peak_nm: f64,
     capture_s: Option<f64>,
+    impulse_torque_rms_nm: f64,
+    impulse_torque_peak_nm: f64,
+    impulse_capture_s: Option<f64>,
     yaw_rate_min_rad_per_s: f64,
     yaw_rate_max_rad_per_s: f64,
 }
@@ -246,6 +249,9 @@ impl From<&Point> for Row {
             torque_rms_nm: held.torque_rms_nm,
             torque_peak_nm: held.torque_peak_nm,
             capture_s: held.capture_s,
+            impulse_torque_rms_nm: point.under_impulses.torque_rms_nm,
+            impulse_torque_peak_nm: point.under_impulses.torque_peak_nm,
+            impulse_capture_s: point.under_impulses.capture_s,
             yaw_rate_min_rad_per_s: held.yaw_rates_rad_per_s.0,
             yaw_rate_max_rad_per_s: held.yaw_rates_rad_per_s.1,
         }
@@ -340,13 +346,14 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         .chain(named("--plant", &arguments.plant));
     arguments.destinations.check(inputs)?;
     if arguments.region {
-        return over_delay(arguments, &scenario, &plan, &plant);
+        return over_delay(arguments, &scenario, &speeds, &plan, &plant);
     }
     let begun = with_progress(speeds.count(), |control| {
         over_speed(&scenario, &speeds, &plan, &plant, control)
     })?;
     let points: Vec<Point> = begun.iter().flatten().cloned().collect();
     if points.is_empty() {
+        check_interrupted(begun.len(), speeds.count())?;
         bail!("no orbit of one cycle was found at any speed from {from} to {to} rpm");
     }
     let results = Results {
@@ -373,32 +380,41 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The region of gain and delay at one speed.
+/// The region of gain and delay at each speed.
 fn over_delay(
     arguments: &Arguments,
     scenario: &Scenario<f64>,
+    speeds_rpm: &Values,
     plan: &Plan,
     plant: &Scenario<f64>,
 ) -> anyhow::Result<Outcome> {
-    let rpm = arguments.from;
-    let [scenario, plant] = [scenario, plant].map(|one| Parameter::Speed.set(one, rpm));
-    validate(&scenario)?;
     let error_s = plan.delay_error_s.abs();
     ensure!(
         error_s > 0.0,
         "--region --delay-error 0: must be greater than 0"
     );
     let errors = Values::between("error of the delay (s)", -error_s, error_s, REGION_ERRORS)?;
-    let all = errors.count() * plan.gains.count();
+    let scenarios = scenarios(scenario, Parameter::Speed, speeds_rpm)?;
+    let all = errors.count() * plan.gains.count() * scenarios.len();
     let cells = with_progress(all, |control| {
-        Ok::<_, SweepError>(region(&scenario, plan, &errors, &plant, control))
+        let region = |scenario: &Scenario<f64>| {
+            let plant = Parameter::Speed.set(plant, scenario.run.wheel_speed_rpm);
+            region(scenario, plan, &errors, &plant, control)
+        };
+        Ok::<_, SweepError>(
+            scenarios
+                .iter()
+                .filter_map(region)
+                .flatten()
+                .collect::<Vec<_>>(),
+        )
     })?;
-    let Some(cells) = cells else {
-        bail!("no orbit of one cycle was found at {rpm} rpm");
-    };
+    if cells.is_empty() {
+        check_interrupted(0, all)?;
+        bail!("no orbit of one cycle was found at any of the speeds");
+    }
     let results = RegionResults {
         signal: arguments.signal,
-        wheel_speed_rpm: rpm,
         memory: arguments.memory,
         limit_nm: arguments.limit,
         cells: &cells,
@@ -406,24 +422,32 @@ fn over_delay(
     arguments
         .destinations
         .write(cells.iter().map(CellRow::from), &results, || {
-            region_chart(&cells, &plan.feedback, rpm).svg()
+            region_chart(&cells, &plan.feedback).svg()
         })?;
-    let periodic = cells.iter().filter(|cell| cell.held.maxima.is_some());
-    say!(
-        "{rpm} rpm: periodic at {} of {} pairs of gain and delay",
-        periodic.count(),
-        cells.len()
-    );
+    for of_speed in cells.chunk_by(|a, b| a.wheel_speed_rpm == b.wheel_speed_rpm) {
+        let periodic = of_speed.iter().filter(|cell| cell.held.maxima.is_some());
+        say!(
+            "{} rpm: periodic at {} of {} pairs of gain and delay",
+            of_speed[0].wheel_speed_rpm,
+            periodic.count(),
+            of_speed.len()
+        );
+    }
     check_interrupted(cells.len(), all)?;
     Ok(Outcome::Success)
 }
 
+fn captured(held: &Held) -> String {
+    let seconds = held.capture_s.map(|seconds| format!("{seconds:.0}"));
+    seconds.unwrap_or("no".into())
+}
+
 fn show(points: &[Point]) {
     say!(
-        "speed  period    multiplier      gain   gains that hold  torque (N m)      maxima  captured"
+        "speed  period    multiplier      gain   gains that hold  torque (N m)      maxima  captured  impulses"
     );
     say!(
-        "rpm    s         free     held            from    to      rms      peak             after s"
+        "rpm    s         free     held            from    to      rms      peak             after s   after s"
     );
     for point in points {
         let (best, held) = (&point.best, &point.held);
@@ -433,7 +457,7 @@ fn show(points: &[Point]) {
                 (format!("{low}"), format!("{high}"))
             });
         say!(
-            "{:<6} {:.6}  {:<8.3} {:<6.3} {:>6}   {low:<7} {high:<7} {:<8.4} {:<8.4} {:<7} {}",
+            "{:<6} {:.6}  {:<8.3} {:<6.3} {:>6}   {low:<7} {high:<7} {:<8.4} {:<8.4} {:<7} {:<9} {}",
             point.wheel_speed_rpm,
             point.period_s,
             point.free_multiplier,
@@ -443,8 +467,8 @@ fn show(points: &[Point]) {
             held.torque_peak_nm,
             held.maxima
                 .map_or("none".into(), |maxima| maxima.to_string()),
-            held.capture_s
-                .map_or("no".into(), |seconds| format!("{seconds:.0}"))
+            captured(held),
+            captured(&point.under_impulses)
         );
     }
 }

@@ -9,11 +9,26 @@ use plot::chart::{AxisSpec, Chart, Look, Panel, Series, large_dots};
 /// A torque, root mean square, that is small, as with an exact delay, N m.
 const SMALL_NM: f64 = 0.05;
 
-/// The cells by what they hold, over the error of the delay and the gain.
-pub fn region_chart(cells: &[Cell], feedback: &Feedback, wheel_speed_rpm: f64) -> Chart {
+/// The cells of each speed by what they hold, over the error of the delay and the gain.
+pub fn region_chart(cells: &[Cell], feedback: &Feedback) -> Chart {
+    let of_speed = cells.chunk_by(|a, b| a.wheel_speed_rpm == b.wheel_speed_rpm);
+    let panel = |cells: &[Cell]| Panel {
+        caption: format!("{} rpm", cells[0].wheel_speed_rpm),
+        x: AxisSpec::linear("delay less period (ms)"),
+        y: AxisSpec::linear(format!("gain (N m per {})", feedback.component.unit)),
+        series: region_series(cells),
+        ..Panel::default()
+    };
+    Chart {
+        heading: "Delayed feedback: gain and delay that hold the orbit, by simulation".into(),
+        panels: of_speed.map(panel).collect(),
+    }
+}
+
+fn region_series(cells: &[Cell]) -> Vec<Series> {
     type Holds = fn(&Cell) -> bool;
     let groups: [(&str, Holds); 3] = [
-        ("periodic, torque less than 0.05 N m", |cell| {
+        ("periodic, torque less than 0.05 N m rms", |cell| {
             cell.held.maxima.is_some() && cell.held.torque_rms_nm < SMALL_NM
         }),
         ("periodic, more torque", |cell| {
@@ -26,18 +41,7 @@ pub fn region_chart(cells: &[Cell], feedback: &Feedback, wheel_speed_rpm: f64) -
         let points = of_group.map(|cell| (1e3 * cell.delay_error_s, cell.gain));
         large_dots(label, n, points.collect())
     });
-    Chart {
-        heading: format!(
-            "Delayed feedback at {wheel_speed_rpm} rpm: gain and delay that hold the orbit"
-        ),
-        panels: vec![Panel {
-            caption: "regime and root mean square of the torque, by simulation".into(),
-            x: AxisSpec::linear("delay less period (ms)"),
-            y: AxisSpec::linear(format!("gain (N m per {})", feedback.component.unit)),
-            series: series.collect(),
-            ..Panel::default()
-        }],
-    }
+    series.collect()
 }
 
 /// Multipliers without and with feedback, and the torque that is left, over the wheel speed.

@@ -1,7 +1,7 @@
 //! The orbit linearised at each control tick, and its multipliers under a feedback.
 
 use super::feedback::Feedback;
-use super::orbit::near_trajectory;
+use super::orbit::orbit_of;
 use super::vehicle::{steps_per_tick, undithered};
 use crate::settled::VehicleOrbit;
 use crate::sweep::Values;
@@ -32,10 +32,10 @@ pub struct Linearised {
 
 /// Derivatives of the state after a tick, by the state before and by the torque; and the rate of the state before.
 #[derive(Debug, Clone)]
-struct Tick {
-    by_state: Matrix4<f64>,
-    by_torque: Vector4<f64>,
-    rate: Vector4<f64>,
+pub(super) struct Tick {
+    pub(super) by_state: Matrix4<f64>,
+    pub(super) by_torque: Vector4<f64>,
+    pub(super) rate: Vector4<f64>,
 }
 
 impl Linearised {
@@ -49,7 +49,7 @@ impl Linearised {
     /// assert!(orbit.free_multiplier < -1.0);
     /// ```
     pub fn of(scenario: &Scenario<f64>) -> Option<Self> {
-        Self::at(scenario, &near_trajectory(scenario)?)
+        Self::at(scenario, &orbit_of(scenario)?)
     }
 
     pub(super) fn at(scenario: &Scenario<f64>, orbit: &VehicleOrbit) -> Option<Self> {
@@ -64,6 +64,16 @@ impl Linearised {
             tick_s,
             ticks: ticks(scenario, start, tick_s, count as usize),
         })
+    }
+
+    /// Length of a tick, s.
+    pub(super) fn tick_s(&self) -> f64 {
+        self.tick_s
+    }
+
+    /// The ticks of a period.
+    pub(super) fn ticks(&self) -> &[Tick] {
+        &self.ticks
     }
 
     /// The greatest modulus of a multiplier beside 1 under a feedback, by power iteration: the vehicle's state

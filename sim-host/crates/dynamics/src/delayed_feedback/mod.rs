@@ -9,6 +9,7 @@
 
 mod feedback;
 mod figure;
+mod impulse;
 mod linearised;
 mod orbit;
 mod over_speed;

@@ -21,9 +21,12 @@ const ORBIT_TOLERANCE: f64 = 1e-11;
 const KEYS: [&str; 2] = [Parameter::Speed.key(), "vehicle.mass_kg"];
 /// Its longest step, as a share of the range: near a homoclinic orbit Newton's method needs a close guess.
 const LONGEST_STEP: f64 = 0.004;
+/// Slower speeds that are tried, and how far apart, rpm.
+const SLOWER: u32 = 8;
+const SLOWER_RPM: f64 = 50.0;
 
 /// The orbit of one cycle that the scenario's trajectory returns to.
-pub(super) fn near_trajectory(scenario: &Scenario<f64>) -> Option<VehicleOrbit> {
+fn near_trajectory(scenario: &Scenario<f64>) -> Option<VehicleOrbit> {
     let vehicle = Vehicle::new(scenario, KEYS).ok()?;
     let run = &scenario.run;
     let search = Search {
@@ -47,6 +50,23 @@ fn orbit_near(vehicle: &Vehicle, guess: &Guess<4>) -> Option<VehicleOrbit> {
     let problem = Shooting::<_, 4, 6>::new(vehicle, guess, &[1.0], 1, ORBIT_TOLERANCE).ok()?;
     let unknowns = problem.guess(&guess.start, guess.period_s, guess.parameters);
     orbit_at(&problem, unknowns.ok()?).ok()
+}
+
+/// The orbit of one cycle at the scenario's speed: near its trajectory, or else along the branch from slower speeds.
+pub(super) fn orbit_of(scenario: &Scenario<f64>) -> Option<VehicleOrbit> {
+    near_trajectory(scenario).or_else(|| {
+        let rpm = scenario.run.wheel_speed_rpm;
+        let slower = (1..=SLOWER).map(|k| rpm - f64::from(k) * SLOWER_RPM);
+        let slower = slower.filter(|rpm| *rpm > 0.0);
+        let scenarios: Vec<Scenario<f64>> = slower
+            .map(|rpm| Parameter::Speed.set(scenario, rpm))
+            .collect();
+        let slowest = scenarios.last()?.run.wheel_speed_rpm;
+        orbit_on(
+            &branch_over_speed(&scenarios, (slowest, rpm + 1.0)),
+            scenario,
+        )
+    })
 }
 
 /// The orbits of one cycle over the speed: the branch through the first that a trajectory returns to.

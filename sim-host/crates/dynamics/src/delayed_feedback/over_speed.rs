@@ -1,6 +1,7 @@
 //! What a feedback does at each wheel speed.
 
 use super::feedback::{Feedback, Plan};
+use super::impulse;
 use super::linearised::{Best, Linearised};
 use super::orbit::{branch_over_speed, orbit_on};
 use super::simulation::{Held, simulate};
@@ -23,6 +24,8 @@ pub struct Point {
     pub best: Best,
     /// The trajectory from the scenario's start under the best gain.
     pub held: Held,
+    /// The same under an impulse per cycle by the whole state.
+    pub under_impulses: Held,
 }
 
 /// Orbits, best gains and simulations over the wheel speed, each with the orbit's own period as delay. `plant` is
@@ -68,6 +71,12 @@ pub fn over_speed(
             free_multiplier: orbit.free_multiplier,
             best,
             held: simulate(&plant(scenario), &feedback, &plan.conditions),
+            under_impulses: impulse::simulate(
+                &plant(scenario),
+                &orbit,
+                plan.feedback.limit_nm,
+                &plan.conditions,
+            ),
         })
     });
     Ok(points.into_iter().flatten().collect())

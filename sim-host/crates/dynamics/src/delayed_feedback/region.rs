@@ -6,9 +6,11 @@ use super::simulation::{Held, simulate};
 use crate::sweep::{RunControl, Values};
 use shared_model::Scenario;
 
-/// One gain and one error of the delay.
+/// One gain and one error of the delay at a wheel speed.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Cell {
+    /// Wheel speed N, rpm.
+    pub wheel_speed_rpm: f64,
     /// The gain.
     pub gain: f64,
     /// Error of the delay, s.
@@ -38,6 +40,7 @@ pub fn region(
             ..plan.feedback
         };
         Cell {
+            wheel_speed_rpm: scenario.run.wheel_speed_rpm,
             gain,
             delay_error_s,
             multiplier: orbit.greatest_multiplier(&feedback),

@@ -1,8 +1,9 @@
-//! A trajectory under feedback.
+//! A trajectory under a torque that is computed at each control tick.
 
 use super::feedback::{Conditions, Feedback};
 use super::vehicle::{steps_per_tick, undithered};
-use crate::period::{TOLERANCE, maxima_of_turns, period_of_maxima};
+use crate::period::{RIPPLE_TOLERANCE, maxima_of_turns, period_of_maxima};
+use nalgebra::Vector4;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
@@ -28,12 +29,13 @@ pub struct Held {
     pub torque_rms_nm: f64,
     /// Its greatest magnitude over the last minute, N m.
     pub torque_peak_nm: f64,
-    /// Time from switching on until the torque stays below 0.5 N m and half of its limit, s; none if it does not.
+    /// Time from switching on until the torque stays below 0.5 N m and half of its limit, s; none if it does not, or
+    /// the motion is not periodic.
     pub capture_s: Option<f64>,
     /// Maxima of the yaw rate in a cycle over the last minute; none if they do not repeat.
     pub maxima: Option<usize>,
-    /// The delay at the end, s.
-    pub delay_s: f64,
+    /// The delay at the end, s, if there is one.
+    pub delay_s: Option<f64>,
     /// Least and greatest yaw rate over the last minute, rad/s.
     pub yaw_rates_rad_per_s: (f64, f64),
 }
@@ -41,34 +43,55 @@ pub struct Held {
 /// The trajectory of a vehicle without dither, the feedback being computed at the control rate and switched on after
 /// a while. The torque is held over a control tick.
 pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditions) -> Held {
+    let tick_s = 1.0 / plant.run.control_rate_hz;
+    let mut law = DelayedFeedback::<f64, LINE>::new(feedback.law(tick_s));
+    let mut noise = Noise::new(conditions.noise);
+    let mut was_on = false;
+    let mut torque_nm = |x: &Vector4<f64>, is_on: bool| {
+        if is_on && !was_on {
+            // The line is full; what it has adapted to in chaos is none of the orbit's.
+            law.restart();
+        }
+        was_on = is_on;
+        law.run(x[feedback.component.index] + noise.next())
+    };
+    let delayed_by = (feedback.latency_ticks, feedback.limit_nm);
+    let held = run(plant, conditions, delayed_by, &mut torque_nm);
+    Held {
+        delay_s: Some(law.delay_ticks() * tick_s),
+        ..held
+    }
+}
+
+/// The trajectory under the torque that `torque_nm` computes from the state at each control tick; it is applied after
+/// the latency, in ticks, and where the second argument is true. `limit_nm` is its greatest.
+pub(super) fn run(
+    plant: &Scenario<f64>,
+    conditions: &Conditions,
+    (latency_ticks, limit_nm): (usize, f64),
+    torque_nm: &mut impl FnMut(&Vector4<f64>, bool) -> f64,
+) -> Held {
     let rate_hz = plant.run.control_rate_hz;
     let tick_s = 1.0 / rate_hz;
     let steps = steps_per_tick(plant);
     let step_s = tick_s / f64::from(steps);
     let (mut model, constant_nm) = undithered(plant);
     let mut state = model.initial_state(plant);
-    let mut law = DelayedFeedback::<f64, LINE>::new(feedback.law(tick_s));
-    let mut noise = Noise::new(conditions.noise);
-    let mut torques_nm: VecDeque<f64> = std::iter::repeat_n(0.0, feedback.latency_ticks).collect();
+    let mut torques_nm: VecDeque<f64> = std::iter::repeat_n(0.0, latency_ticks).collect();
     let ticks = |time_s: f64| (time_s * rate_hz) as u64;
     let free = ticks(conditions.free_s);
     let all = free + ticks(conditions.time_s);
     let judged = all.saturating_sub(ticks(JUDGED_S));
-    let index = feedback.component.index;
-    let held_nm = HELD_NM.min(0.5 * feedback.limit_nm);
+    let held_nm = HELD_NM.min(0.5 * limit_nm);
     let (mut squares, mut peak_nm, mut last_great) = (0.0, 0.0_f64, free);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut turns = Vec::new();
     let mut last = (state.x[YAW_RATE], 0.0);
     for tick in 0..all {
         interrupt::check();
-        if tick == free {
-            // The line is full; what it has adapted to in chaos is none of the orbit's.
-            law.restart();
-        }
-        let wanted_nm = law.run(state.x[index] + noise.next());
-        // The line fills before it is switched on.
-        torques_nm.push_back(if tick < free { 0.0 } else { wanted_nm });
+        let is_on = tick >= free;
+        let wanted_nm = torque_nm(&state.x, is_on);
+        torques_nm.push_back(if is_on { wanted_nm } else { 0.0 });
         let torque_nm = torques_nm.pop_front().unwrap_or(0.0);
         model.set_motor_torque_nm(constant_nm + torque_nm);
         for _ in 0..steps {
@@ -91,12 +114,15 @@ pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditi
     }
     let range = high - low;
     let maxima = maxima_of_turns(&turns, range);
+    // A noisy torque moves the maxima a little.
+    let maxima = period_of_maxima(&maxima, range, RIPPLE_TOLERANCE).maxima();
+    let is_captured = maxima.is_some() && last_great < judged;
     Held {
         torque_rms_nm: (squares / (all - judged).max(1) as f64).sqrt(),
         torque_peak_nm: peak_nm,
-        capture_s: (last_great < judged).then(|| (last_great - free) as f64 * tick_s),
-        maxima: period_of_maxima(&maxima, range, TOLERANCE).maxima(),
-        delay_s: law.delay_ticks() * tick_s,
+        capture_s: is_captured.then(|| (last_great - free) as f64 * tick_s),
+        maxima,
+        delay_s: None,
         yaw_rates_rad_per_s: (low, high),
     }
 }
