@@ -33,7 +33,7 @@ impl Message {
     }
 
     /// The message with that identifier on CAN FD.
-    pub fn from_can_identifier(identifier: u16) -> Option<Self> {
+    pub(crate) fn from_can_identifier(identifier: u16) -> Option<Self> {
         let named = |message: &Self| message.can_identifier() == identifier;
         Self::ALL.into_iter().find(named)
     }

@@ -164,7 +164,7 @@ pub fn layout() -> u16 {
 }
 
 /// The number of a board in a block.
-pub fn board_number(board: &str) -> u16 {
+pub(crate) fn board_number(board: &str) -> u16 {
     SHORT_CHECKSUM.checksum(board.as_bytes())
 }
 
@@ -293,7 +293,7 @@ pub fn decode(bytes: &[u8], board: &str) -> Result<Scenario<f32>, ConfigurationE
 ///
 /// # Errors
 /// The first reason why it is refused.
-pub fn decode_part(
+pub(crate) fn decode_part(
     part: Part,
     block: &[u8],
     board: &str,
