@@ -11,15 +11,23 @@ const OWN: [&str; 4] = ["c-reference", "firmware", "tests", "xtask"];
 
 /// Packs all others and builds each from its package: four minutes on two cores.
 pub fn run() -> Result<()> {
+    // A folder of its own for each run: cargo unpacks the packages by the folder's path and their version, and would
+    // take those of an earlier run at the same path.
+    let folder = workspace::target_dir()?.join(format!("packages-{}", std::process::id()));
     let mut cargo = rustup::cargo(&workspace::pinned_channel()?)?;
     cargo
         .args(["package", "--workspace", "--allow-dirty"])
         .args(OWN.iter().flat_map(|package| ["--exclude", package]))
         .args(workspace::locked())
+        .arg("--target-dir")
+        .arg(&folder)
         // Only whether it builds matters, so it is not optimised.
         .env("CARGO_PROFILE_DEV_OPT_LEVEL", "0")
         .env("CARGO_PROFILE_DEV_DEBUG", "false");
-    stage("packages", || process::run(&mut cargo)).context(Exit::failed(
+    let built = stage("packages", || process::run(&mut cargo));
+    // What is left of it does no harm.
+    let _ = std::fs::remove_dir_all(&folder);
+    built.context(Exit::failed(
         "a package does not build; the output is above",
     ))?;
     println!("passed: every publishable package builds from its packed files");
