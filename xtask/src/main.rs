@@ -100,7 +100,8 @@ enum Command {
         overwrite_expected: bool,
     },
 
-    /// Checks the format, and runs clippy on host and firmware; warnings are errors.
+    /// Checks the format, the API documentation, and runs clippy on host and firmware; warnings are
+    /// errors.
     #[command(after_help = "Example:\n  cargo xtask lint")]
     Lint,
 

@@ -14,6 +14,7 @@ pub fn run() -> Result<()> {
     require_components(&pinned)?;
     stage("format", || format(&pinned))?;
     stage("clippy on the host's packages", || host(&pinned))?;
+    stage("API documentation", || documentation(&pinned))?;
     // Only the pinned toolchain has a clippy.
     if setup::target::toolchain(&pinned)?.as_ref() != Some(&pinned) {
         bail!(
@@ -52,6 +53,18 @@ fn require_components(pinned: &str) -> Result<()> {
 fn format(pinned: &str) -> Result<()> {
     let done = process::run(rustup::cargo(pinned)?.args(["fmt", "--all", "--check"]));
     done.context(Exit::failed("the format differs: run `cargo fmt --all`"))
+}
+
+fn documentation(pinned: &str) -> Result<()> {
+    let mut cargo = rustup::cargo(pinned)?;
+    cargo
+        .args(["doc", "--no-deps", "--workspace", "--exclude", "firmware"])
+        .args(workspace::locked())
+        .env("RUSTDOCFLAGS", DENY_WARNINGS[1..].join(" "));
+    let done = process::run(&mut cargo);
+    done.context(Exit::failed(
+        "the documentation has warnings; they are above",
+    ))
 }
 
 fn host(pinned: &str) -> Result<()> {

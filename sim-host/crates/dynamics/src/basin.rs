@@ -30,7 +30,7 @@ pub struct Basin {
 /// Follows the motion from each start of the grid; yaw rate and steering rate start as in the
 /// scenario.
 ///
-/// Trajectories are told apart by kind and extent ([`Attractor::is_same`]); the first on each
+/// Trajectories are told apart by kind and extent; the first on each
 /// attractor without period has its exponent worked out, which tells chaos from a transient that
 /// outlasts the run. Time grows with the number of starts times the length of a run; starts that
 /// diverge end early.

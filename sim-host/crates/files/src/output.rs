@@ -205,7 +205,7 @@ pub fn write(
 /// Writes a text.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_text(path: &Path, text: &str, force: bool) -> Result<(), WriteError> {
     write(path, force, |to| Ok(to.write_all(text.as_bytes())?))
 }
@@ -213,7 +213,7 @@ pub fn write_text(path: &Path, text: &str, force: bool) -> Result<(), WriteError
 /// Writes results as JSON.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_json(path: &Path, results: &impl Serialize, force: bool) -> Result<(), WriteError> {
     write(path, force, |to| {
         serde_json::to_writer_pretty(&mut *to, results)?;
@@ -224,7 +224,7 @@ pub fn write_json(path: &Path, results: &impl Serialize, force: bool) -> Result<
 /// Writes rows as CSV, with the field names as column names.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn write_rows(
     path: &Path,
     rows: impl IntoIterator<Item = impl Serialize>,

@@ -137,7 +137,7 @@ pub struct ProcessorFault {
 }
 
 impl ProcessorFault {
-    /// [`Action::EVENTS`], all at the same control tick.
+    /// `Action::EVENTS`, all at the same control tick.
     pub fn events(tick: u32) -> impl Iterator<Item = Self> {
         Action::EVENTS.into_iter().map(move |action| Self {
             action,
