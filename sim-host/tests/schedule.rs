@@ -153,7 +153,7 @@ fn bad_input_is_refused_and_nothing_is_written() {
     }
 }
 
-/// Ten seconds on 2 cores: `cargo test --release -p sim-host --test schedule -- --ignored`.
+/// Twenty seconds on 2 cores: `cargo test --release -p sim-host --test schedule -- --ignored`.
 #[test]
 #[ignore = "makes the whole table"]
 fn the_whole_table_is_made_again_byte_for_byte() {

@@ -28,7 +28,7 @@ use std::path::PathBuf;
 /// trajectory may be at rest) at that speed and no other regime at its neighbours, plus a margin.
 /// The map uses the averaged dither. The entries are then checked with the true signal at the PWM
 /// rate, at the table's speeds and midway. The multipliers of the orbits under each entry must stay
-/// below --greatest-multiplier, at its own speed and at its neighbours. The run takes about ten
+/// below --greatest-multiplier, at its own speed and at its neighbours. The run takes about twenty
 /// seconds on 2 cores. The exit code is 1 if a speed has no such amplitude, a multiplier is greater,
 /// or a check fails.
 #[derive(clap::Args)]
