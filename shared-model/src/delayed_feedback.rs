@@ -8,7 +8,7 @@ use crate::Real;
 
 /// The last `N` values of a signal, one per tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DelayLine<T, const N: usize> {
+struct DelayLine<T, const N: usize> {
     values: [T; N],
     /// Place of the newest value.
     newest: usize,
@@ -18,7 +18,7 @@ pub struct DelayLine<T, const N: usize> {
 
 impl<T: Real, const N: usize> DelayLine<T, N> {
     /// No values yet.
-    pub fn new() -> Self {
+    fn new() -> Self {
         Self {
             values: [T::zero(); N],
             newest: 0,
@@ -27,7 +27,7 @@ impl<T: Real, const N: usize> DelayLine<T, N> {
     }
 
     /// The signal at this tick; the oldest value is dropped.
-    pub fn push(&mut self, value: T) {
+    fn push(&mut self, value: T) {
         let next = self.newest + 1;
         self.newest = if next < N { next } else { 0 };
         if let Some(place) = self.values.get_mut(self.newest) {
@@ -40,7 +40,7 @@ impl<T: Real, const N: usize> DelayLine<T, N> {
 
     /// The value that was the newest `ticks` pushes ago, by linear interpolation between two; `None` where the
     /// line does not reach so far back yet, or at all.
-    pub fn before(&self, ticks: T) -> Option<T> {
+    fn before(&self, ticks: T) -> Option<T> {
         let whole = ticks.to_u32();
         let share = ticks - T::from_u32(whole);
         let later = self.at(whole as usize)?;
@@ -62,12 +62,6 @@ impl<T: Real, const N: usize> DelayLine<T, N> {
             (self.newest + N).checked_sub(ticks)?
         };
         self.values.get(place).copied()
-    }
-}
-
-impl<T: Real, const N: usize> Default for DelayLine<T, N> {
-    fn default() -> Self {
-        Self::new()
     }
 }
 

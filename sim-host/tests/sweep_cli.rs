@@ -97,6 +97,7 @@ fn ranges_are_checked() {
         ("--from 0", &["run.wheel_speed_rpm = 0"]),
         ("--from 300 --to 310 --step 10", &["no orbit of one cycle"]),
         ("--plant missing.toml", &["missing.toml"]),
+        ("--step 0.001", &["--step 0.001", "must be at most 1000"]),
     ] {
         assert_refused(&format!("feedback {option}"), parts);
     }
@@ -221,4 +222,32 @@ fn ranges_have_the_decimals_that_were_typed() {
         found.dedup();
         assert_eq!(found, typed, "{line}");
     }
+}
+
+/// A period longer than the delay line is refused, and a vehicle that leaves all bounds is reported.
+#[test]
+fn feedback_needs_a_line_as_long_as_the_period_and_reports_a_divergence() {
+    let folder = folder();
+    let write = |name: &str, text: &str| {
+        fs::write(folder.path().join(name), text).expect("the file can be written");
+    };
+    write(
+        "fast.toml",
+        "[run]\ncontrol_rate_hz = 5000.0\npwm_rate_hz = 20000.0\n",
+    );
+    let parts = ["control_rate_hz = 5000", "at most 2000 Hz"];
+    for option in ["--config", "--plant"] {
+        let arguments = ["feedback", option, "fast.toml"];
+        common::assert_refused(folder.path(), arguments, &parts);
+    }
+    write(
+        "b.toml",
+        "[tires.front]\nstiffness_per_rad = 6.7651\nshape = 1.3\npeak_n = 6436.8\n\
+         [tires.rear]\nstiffness_per_rad = 9.0051\nshape = 1.3\npeak_n = 5430.0\n",
+    );
+    let line = "feedback --from 1750 --to 1750 --plant b.toml --out o.csv";
+    let output = assert_ends(&mut command(folder.path(), line.split_whitespace()), 0);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("diverges"));
+    let csv = fs::read_to_string(folder.path().join("o.csv")).expect("written");
+    assert!(!csv.contains("NaN") && !csv.contains("inf"), "{csv}");
 }

@@ -8,7 +8,8 @@ use anyhow::{bail, ensure};
 use dynamics::component::Component;
 use dynamics::config::validate;
 use dynamics::delayed_feedback::{
-    Cell, Conditions, Feedback, Held, Plan, Point, chart, over_speed, region, region_chart,
+    Cell, Conditions, Feedback, Held, LINE_TICKS, Plan, Point, chart, over_speed, region,
+    region_chart,
 };
 use dynamics::sweep::{Parameter, SweepError, Values, scenarios};
 use dynamics::words::Short;
@@ -152,8 +153,11 @@ pub struct Arguments {
     destinations: Destinations,
 }
 
-/// Gains tried at each speed.
+/// Gains tried at each speed, and speeds.
 const MOST_GAINS: usize = 1000;
+const MOST_SPEEDS: usize = 1000;
+/// Control rate at which the delay line has room for any orbit's period, Hz: 4 s.
+const MOST_RATE_HZ: f64 = 2000.0;
 /// Times of a simulation, s.
 const FREE_S: std::ops::RangeInclusive<f64> = 10.0..=10_000.0;
 const TIME_S: std::ops::RangeInclusive<f64> = 60.0..=100_000.0;
@@ -230,8 +234,9 @@ struct Row {
     impulse_torque_rms_nm: f64,
     impulse_torque_peak_nm: f64,
     impulse_capture_s: Option<f64>,
-    yaw_rate_min_rad_per_s: f64,
-    yaw_rate_max_rad_per_s: f64,
+    diverges_at_s: Option<f64>,
+    yaw_rate_min_rad_per_s: Option<f64>,
+    yaw_rate_max_rad_per_s: Option<f64>,
 }
 
 impl From<&Point> for Row {
@@ -252,8 +257,9 @@ impl From<&Point> for Row {
             impulse_torque_rms_nm: point.under_impulses.torque_rms_nm,
             impulse_torque_peak_nm: point.under_impulses.torque_peak_nm,
             impulse_capture_s: point.under_impulses.capture_s,
-            yaw_rate_min_rad_per_s: held.yaw_rates_rad_per_s.0,
-            yaw_rate_max_rad_per_s: held.yaw_rates_rad_per_s.1,
+            diverges_at_s: held.diverges_at_s,
+            yaw_rate_min_rad_per_s: held.yaw_rates_rad_per_s.map(|range| range.0),
+            yaw_rate_max_rad_per_s: held.yaw_rates_rad_per_s.map(|range| range.1),
         }
     }
 }
@@ -338,7 +344,23 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let plan = arguments.plan()?;
     let (from, to) = (arguments.from, arguments.to);
     let speeds = Values::new(Parameter::Speed.name(), from, to, arguments.step)?;
+    ensure!(
+        speeds.count() <= MOST_SPEEDS,
+        "--from {} --to {} --step {}: {} speeds, must be at most {MOST_SPEEDS}",
+        Short(from),
+        Short(to),
+        Short(arguments.step),
+        speeds.count()
+    );
     let plant = arguments.plant(&scenario)?;
+    for scenario in [&scenario, &plant] {
+        let rate_hz = scenario.run.control_rate_hz;
+        ensure!(
+            rate_hz <= MOST_RATE_HZ,
+            "run.control_rate_hz = {}: must be at most {MOST_RATE_HZ} Hz, for a delay line of {LINE_TICKS} ticks",
+            Short(rate_hz)
+        );
+    }
     let inputs = arguments
         .config
         .input()
@@ -438,8 +460,11 @@ fn over_delay(
 }
 
 fn captured(held: &Held) -> String {
-    let seconds = held.capture_s.map(|seconds| format!("{seconds:.0}"));
-    seconds.unwrap_or("no".into())
+    match (held.capture_s, held.diverges_at_s) {
+        (Some(seconds), _) => format!("{seconds:.0}"),
+        (None, Some(_)) => "diverges".into(),
+        (None, None) => "no".into(),
+    }
 }
 
 fn show(points: &[Point]) {

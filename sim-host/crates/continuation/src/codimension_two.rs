@@ -7,8 +7,7 @@ use crate::test_function::Bifurcation;
 use nalgebra::Complex;
 
 /// The second condition (Y. A. Kuznetsov, Elements of Applied Bifurcation Theory, chapters 8 and 9).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Condition {
     /// Two folds meet: both parameters turn back.
     Cusp,

@@ -11,8 +11,8 @@ use crate::equilibria;
 use crate::sweep::Parameter;
 use continuation::Bifurcation;
 use continuation::arclength::Settings;
-use continuation::branch::{Special, follow, orbit_at};
-use continuation::orbit::{Orbit, Shooting};
+use continuation::branch::{Branch, Special, follow, orbit_at};
+use continuation::orbit::{Guess, Orbit, Shooting};
 use continuation::start::{returns, rises};
 use continuation::trajectory::integrate;
 use continuation::vehicle::Vehicle;
@@ -55,8 +55,7 @@ pub(crate) enum Settled {
 pub(crate) fn settled(scenario: &Scenario<f64>, end: &[f64; 4]) -> Option<Settled> {
     let vehicle = Vehicle::new(scenario, [Parameter::Speed.key(), "vehicle.mass_kg"]).ok()?;
     let compared = Compared::new(&vehicle, end)?;
-    let is_its_end = |orbit: &VehicleOrbit| orbit.is_stable() && compared.approaches(orbit);
-    match compared.orbits().find(is_its_end) {
+    match compared.approached() {
         Some(orbit) => Some(Settled::Orbit(Box::new(OrbitPoint::new(&vehicle, &orbit)))),
         None => compared.equilibrium(scenario).map(Settled::Equilibrium),
     }
@@ -77,15 +76,10 @@ pub(crate) fn end_of_orbit(
     let (least, greatest) = Scenario::<f64>::range(parameter.key())?;
     let range = (from.min(to).max(least), from.max(to).min(greatest));
     let settings = Settings::over(&[range]);
-    let spans = settings.spans();
-    let problem =
-        Shooting::<_, 4, 6>::new(&vehicle, &orbit.guess(), &spans, 1, BRANCH_TOLERANCE).ok()?;
-    let guess = problem
-        .guess(orbit.start(), orbit.period_s, orbit.parameters)
-        .ok()?;
-    let axis = problem.parameter_axis((to - from).signum());
+    let sign = (to - from).signum();
     // The first unstable orbit is the last that is needed.
-    let branch = follow(&problem, guess, &axis, &settings, VehicleOrbit::is_stable).ok()?;
+    let keeps = VehicleOrbit::is_stable;
+    let branch = branch_from(&vehicle, &orbit, sign, &settings, BRANCH_TOLERANCE, keeps)?;
     let is_end = |special: &&Special<FrictionMode, 4>| match special.kind {
         Bifurcation::PeriodDoubling | Bifurcation::Fold | Bifurcation::NeimarkSacker => true,
         Bifurcation::BranchPoint | Bifurcation::Grazing => false,
@@ -107,21 +101,29 @@ pub(crate) struct Decay {
     pub to: f64,
 }
 
-/// The decay beside the trajectory from `end`, and the range of the parameter within `range` in which the
+/// The decay beside the trajectory from `end`, which may be at rest there, and the range of the parameter within `range` in which the
 /// multipliers stay below `margin`. `None` without a stable orbit or equilibrium that the trajectory approaches.
 pub(crate) fn decay(
     scenario: &Scenario<f64>,
     parameter: Parameter,
-    end: &[f64; 4],
+    (end, is_at_rest): (&[f64; 4], bool),
     range: (f64, f64),
     margin: f64,
 ) -> Option<Decay> {
     let vehicle = Vehicle::new(scenario, [parameter.key(), "vehicle.mass_kg"]).ok()?;
     let value = vehicle.parameters()[0];
     let compared = Compared::new(&vehicle, end)?;
-    let is_its_end = |orbit: &VehicleOrbit| orbit.is_stable() && compared.approaches(orbit);
-    let Some(orbit) = compared.orbits().find(is_its_end) else {
-        let state = compared.equilibrium(scenario).unwrap_or(*end);
+    let orbit = if is_at_rest {
+        None
+    } else {
+        compared.approached()
+    };
+    let Some(orbit) = orbit else {
+        let state = if is_at_rest {
+            *end
+        } else {
+            compared.equilibrium(scenario)?
+        };
         let left = |value| left_at_rest(&parameter.set(scenario, value), &state);
         let [from, to] = [range.0, range.1].map(|bound| last_below(left, value, bound, margin));
         return Some(Decay {
@@ -132,16 +134,9 @@ pub(crate) fn decay(
     };
     let multiplier = greatest_multiplier(&orbit);
     let settings = Settings::over(&[range]);
-    let spans = settings.spans();
-    let problem =
-        Shooting::<_, 4, 6>::new(&vehicle, &orbit.guess(), &spans, 1, BRANCH_TOLERANCE).ok()?;
-    let guess = problem
-        .guess(orbit.start(), orbit.period_s, orbit.parameters)
-        .ok()?;
     let keeps = |orbit: &VehicleOrbit| greatest_multiplier(orbit) <= margin;
     let bound = |sign| {
-        let axis = problem.parameter_axis(sign);
-        let branch = follow(&problem, guess.clone(), &axis, &settings, keeps).ok()?;
+        let branch = branch_from(&vehicle, &orbit, sign, &settings, BRANCH_TOLERANCE, keeps)?;
         let values = branch
             .orbits
             .iter()
@@ -153,6 +148,31 @@ pub(crate) fn decay(
         from: bound(-1.0)?,
         to: bound(1.0)?,
     })
+}
+
+/// The branch from an orbit towards greater (`sign` 1) or smaller (-1) values of the first parameter, up to the first
+/// orbit that is not kept.
+pub(crate) fn branch_from(
+    vehicle: &Vehicle,
+    orbit: &VehicleOrbit,
+    sign: f64,
+    settings: &Settings,
+    tolerance: f64,
+    keeps: impl FnMut(&VehicleOrbit) -> bool,
+) -> Option<Branch<FrictionMode, 4>> {
+    let guess = orbit.guess();
+    let problem =
+        Shooting::<_, 4, 6>::new(vehicle, &guess, &settings.spans(), 1, tolerance).ok()?;
+    let unknowns = problem.guess(&guess.start, guess.period_s, guess.parameters);
+    let axis = problem.parameter_axis(sign);
+    follow(&problem, unknowns.ok()?, &axis, settings, keeps).ok()
+}
+
+/// The orbit near a guess, at its parameters.
+pub(crate) fn orbit_near(vehicle: &Vehicle, guess: &Guess<4>) -> Option<VehicleOrbit> {
+    let problem = Shooting::<_, 4, 6>::new(vehicle, guess, &[1.0], 1, ORBIT_TOLERANCE).ok()?;
+    let unknowns = problem.guess(&guess.start, guess.period_s, guess.parameters);
+    orbit_at(&problem, unknowns.ok()?).ok()
 }
 
 fn greatest_multiplier(orbit: &VehicleOrbit) -> f64 {
@@ -249,17 +269,14 @@ impl<'a> Compared<'a> {
         returns(&self.crossings, &self.extent, parameters, MOST_CYCLES)
             .into_iter()
             .filter(|found| found.distance < FARTHEST)
-            .filter_map(|found| {
-                let guess = found.guess;
-                let problem =
-                    Shooting::<_, 4, 6>::new(self.vehicle, &guess, &[1.0], 1, ORBIT_TOLERANCE)
-                        .ok()?;
-                let unknowns = problem
-                    .guess(&guess.start, guess.period_s, guess.parameters)
-                    .ok()?;
-                let orbit = orbit_at(&problem, unknowns).ok()?;
-                (orbit.size() > SHRUNK * self.extent.amax()).then_some(orbit)
-            })
+            .filter_map(|found| orbit_near(self.vehicle, &found.guess))
+            .filter(|orbit| orbit.size() > SHRUNK * self.extent.amax())
+    }
+
+    /// The stable orbit that it approaches.
+    fn approached(&self) -> Option<VehicleOrbit> {
+        self.orbits()
+            .find(|orbit| orbit.is_stable() && self.approaches(orbit))
     }
 
     /// The trajectory's crossings come nearer to the orbit's, or are on it.

@@ -81,7 +81,7 @@ fn the_least_gain_divides_held_from_chaotic() {
         assert_eq!(held.capture_s.is_some(), is_held, "{gain}: {held:?}");
         assert_eq!(held.torque_rms_nm < 1e-3, is_held, "{gain}: {held:?}");
         // The held orbit is as large as the chaotic motion.
-        let (low, high) = held.yaw_rates_rad_per_s;
+        let (low, high) = held.yaw_rates_rad_per_s.unwrap();
         assert!(high - low > 2.0, "{held:?}");
     }
 }
@@ -104,6 +104,16 @@ fn the_delay_adapts_to_the_period_of_the_orbit() {
     assert!(adapted.torque_rms_nm < 1e-3, "{adapted:?}");
     let delay_s = adapted.delay_s.unwrap();
     assert!((delay_s - orbit.period_s).abs() < 1e-4, "{adapted:?}");
+}
+
+/// A gain so great that numbers overflow is not taken for one that leaves nothing of a perturbation.
+#[test]
+fn an_overflow_is_no_decay() {
+    let (_, orbit) = at(1750.0);
+    for gain in [1e4, 1e200, -1e300] {
+        let found = orbit.greatest_multiplier(&feedback(&orbit, gain));
+        assert!(found > 1.0, "{gain}: {found}");
+    }
 }
 
 /// No torque, no hold; the limit is kept.

@@ -4,6 +4,9 @@ use crate::component::Component;
 use crate::sweep::Values;
 use shared_model::delayed_feedback::Law;
 
+/// Ticks of the delay line: 8 s at a control rate of 1 kHz.
+pub const LINE_TICKS: usize = 8192;
+
 /// A feedback: which signal, how strong, how late.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Feedback {
@@ -11,7 +14,7 @@ pub struct Feedback {
     pub component: Component,
     /// Torque per difference of the signal, N m s/rad for rates and N m/rad for angles.
     pub gain: f64,
-    /// Delay, s.
+    /// Delay, s; without torque if it has more ticks than the line.
     pub delay_s: f64,
     /// Weight of a period relative to the one after it, 0 to less than 1.
     pub memory: f64,

@@ -1,6 +1,6 @@
 //! The orbit linearised at each control tick, and its multipliers under a feedback.
 
-use super::feedback::Feedback;
+use super::feedback::{Feedback, LINE_TICKS};
 use super::orbit::orbit_of;
 use super::vehicle::{steps_per_tick, undithered};
 use crate::settled::VehicleOrbit;
@@ -22,7 +22,7 @@ pub struct Linearised {
     /// Its period, s.
     pub period_s: f64,
     /// A state on it.
-    pub start: [f64; 4],
+    pub(super) start: [f64; 4],
     /// Its multiplier of greatest modulus without feedback, beside 1.
     pub free_multiplier: f64,
     /// A whole number of ticks makes the period: about the control rate's.
@@ -40,7 +40,7 @@ pub(super) struct Tick {
 
 impl Linearised {
     /// The orbit of one cycle nearest to the scenario's trajectory, stable or not; `None` if Newton's method
-    /// finds none.
+    /// finds none, or its period has more ticks than the delay line ([`LINE_TICKS`]).
     ///
     /// ```
     /// let scenario = shared_model::Scenario::reconstruction();
@@ -55,6 +55,9 @@ impl Linearised {
     pub(super) fn at(scenario: &Scenario<f64>, orbit: &VehicleOrbit) -> Option<Self> {
         let (period_s, start) = (orbit.period_s, *orbit.start());
         let count = (period_s * scenario.run.control_rate_hz).round();
+        if count < 1.0 || count > LINE_TICKS as f64 {
+            return None;
+        }
         let tick_s = period_s / count;
         let free_multiplier = orbit.multipliers.first()?;
         Some(Self {
@@ -89,9 +92,11 @@ impl Linearised {
             }
             perturbed.remove_shift(self, index);
             let log_size = perturbed.normalise();
-            if !log_size.is_finite() {
+            match log_size {
                 // All of it is gone: as with the dead beat of a scalar system.
-                return 0.0;
+                f64::NEG_INFINITY => return 0.0,
+                size if !size.is_finite() => return f64::INFINITY,
+                _ => {}
             }
             if period >= SETTLING_PERIODS {
                 log_growth += log_size;
@@ -143,6 +148,7 @@ fn ticks(scenario: &Scenario<f64>, start: Vector4<f64>, tick_s: f64, count: usiz
     let mut state = model.state(start);
     let mut ticks = Vec::with_capacity(count);
     for _ in 0..count {
+        interrupt::check();
         let mode = model.mode_at(&state.x, Injection::Off);
         let rate = model.derivative(&state.x, Injection::Off, mode);
         let mut after = State {
@@ -189,7 +195,7 @@ impl Perturbation {
         }
     }
 
-    /// The value that was pushed last so many ticks ago.
+    /// The value that was the newest that number of ticks ago.
     fn before(&self, ticks: f64) -> f64 {
         let whole = ticks.floor();
         let at = |back: usize| {
@@ -224,12 +230,13 @@ impl Perturbation {
         }
     }
 
-    /// Scales it to size 1; the logarithm of its size before.
+    /// Scales it to size 1; the logarithm of its size before, infinite where numbers have overflowed.
     fn normalise(&mut self) -> f64 {
-        let size = self
-            .line
-            .iter()
-            .fold(self.state.amax(), |size, value| size.max(value.abs()));
+        let values = self.state.iter().chain(&self.line);
+        if !values.clone().all(|value| value.is_finite()) {
+            return f64::INFINITY;
+        }
+        let size = values.fold(0.0, |size: f64, value| size.max(value.abs()));
         self.state /= size;
         let others = self.line.iter_mut().chain(&mut self.torques_nm);
         others.for_each(|value| *value /= size);

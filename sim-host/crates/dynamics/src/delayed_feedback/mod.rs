@@ -17,7 +17,7 @@ mod region;
 mod simulation;
 mod vehicle;
 
-pub use feedback::{Conditions, Feedback, Plan};
+pub use feedback::{Conditions, Feedback, LINE_TICKS, Plan};
 pub use figure::{chart, region_chart};
 pub use linearised::{Best, Linearised};
 pub use over_speed::{Point, over_speed};

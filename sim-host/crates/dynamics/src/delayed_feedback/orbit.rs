@@ -1,11 +1,9 @@
 //! Orbits of one cycle: near a trajectory, and along a branch over the wheel speed.
 
-use crate::settled::VehicleOrbit;
+use crate::settled::{VehicleOrbit, branch_from, orbit_near};
 use crate::sweep::Parameter;
-use continuation::Failure;
 use continuation::arclength::Settings;
-use continuation::branch::{follow, orbit_at};
-use continuation::orbit::{Guess, Shooting};
+use continuation::orbit::Guess;
 use continuation::start::{Search, near_returns};
 use continuation::vehicle::Vehicle;
 use nalgebra::Vector4;
@@ -16,11 +14,13 @@ use shared_model::vehicle::YAW_RATE;
 const SEARCHED_AFTER_S: f64 = 60.0;
 const SEARCHED_S: f64 = 100.0;
 const SEARCH_TOLERANCE: f64 = 1e-9;
-const ORBIT_TOLERANCE: f64 = 1e-11;
+const TOLERANCE: f64 = 1e-11;
 /// Parameters of the orbits: the speed, and one that is not varied.
 const KEYS: [&str; 2] = [Parameter::Speed.key(), "vehicle.mass_kg"];
 /// Its longest step, as a share of the range: near a homoclinic orbit Newton's method needs a close guess.
 const LONGEST_STEP: f64 = 0.004;
+/// How far it is followed beyond the speeds, rpm.
+const BEYOND_RPM: f64 = 1.0;
 /// Slower speeds that are tried, and how far apart, rpm.
 const SLOWER: u32 = 8;
 const SLOWER_RPM: f64 = 50.0;
@@ -46,56 +46,41 @@ fn near_trajectory(scenario: &Scenario<f64>) -> Option<VehicleOrbit> {
     orbit_near(&vehicle, &found.first()?.guess)
 }
 
-fn orbit_near(vehicle: &Vehicle, guess: &Guess<4>) -> Option<VehicleOrbit> {
-    let problem = Shooting::<_, 4, 6>::new(vehicle, guess, &[1.0], 1, ORBIT_TOLERANCE).ok()?;
-    let unknowns = problem.guess(&guess.start, guess.period_s, guess.parameters);
-    orbit_at(&problem, unknowns.ok()?).ok()
-}
-
 /// The orbit of one cycle at the scenario's speed: near its trajectory, or else along the branch from slower speeds.
 pub(super) fn orbit_of(scenario: &Scenario<f64>) -> Option<VehicleOrbit> {
-    near_trajectory(scenario).or_else(|| {
-        let rpm = scenario.run.wheel_speed_rpm;
-        let slower = (1..=SLOWER).map(|k| rpm - f64::from(k) * SLOWER_RPM);
-        let slower = slower.filter(|rpm| *rpm > 0.0);
-        let scenarios: Vec<Scenario<f64>> = slower
-            .map(|rpm| Parameter::Speed.set(scenario, rpm))
-            .collect();
-        let slowest = scenarios.last()?.run.wheel_speed_rpm;
-        orbit_on(
-            &branch_over_speed(&scenarios, (slowest, rpm + 1.0)),
-            scenario,
-        )
-    })
+    let along_branch = || orbit_on(&branch_over_speed(&[*scenario]), scenario);
+    near_trajectory(scenario).or_else(along_branch)
 }
 
-/// The orbits of one cycle over the speed: the branch through the first that a trajectory returns to.
-pub(super) fn branch_over_speed(
-    scenarios: &[Scenario<f64>],
-    range: (f64, f64),
-) -> Vec<VehicleOrbit> {
-    let first = scenarios.iter().find_map(|scenario| {
-        let orbit = near_trajectory(scenario)?;
-        Some((Vehicle::new(scenario, KEYS).ok()?, orbit))
-    });
-    let Some((vehicle, orbit)) = first else {
+/// The orbits of one cycle over the scenarios' speeds, ascending: the branch through the first that a trajectory
+/// returns to, at these speeds or at slower ones.
+pub(super) fn branch_over_speed(scenarios: &[Scenario<f64>]) -> Vec<VehicleOrbit> {
+    let (Some(slowest), Some(fastest)) = (scenarios.first(), scenarios.last()) else {
         return Vec::new();
     };
+    let [first_rpm, last_rpm] = [slowest, fastest].map(|one| one.run.wheel_speed_rpm);
+    let slower = (1..=SLOWER).map(|k| first_rpm - f64::from(k) * SLOWER_RPM);
+    let slower = slower
+        .filter(|rpm| *rpm > BEYOND_RPM)
+        .map(|rpm| Parameter::Speed.set(slowest, rpm));
+    let found = scenarios
+        .iter()
+        .copied()
+        .chain(slower)
+        .find_map(|scenario| {
+            let orbit = near_trajectory(&scenario)?;
+            Some((Vehicle::new(&scenario, KEYS).ok()?, orbit))
+        });
+    let Some((vehicle, orbit)) = found else {
+        return Vec::new();
+    };
+    let [rpm, _] = orbit.parameters;
+    let range = (first_rpm.min(rpm) - BEYOND_RPM, last_rpm + BEYOND_RPM);
     let mut settings = Settings::over(&[range]);
     settings.longest_step = LONGEST_STEP;
-    let both_ways = || -> Result<Vec<VehicleOrbit>, Failure> {
-        let spans = settings.spans();
-        let problem =
-            Shooting::<_, 4, 6>::new(&vehicle, &orbit.guess(), &spans, 1, ORBIT_TOLERANCE)?;
-        let guess = problem.guess(orbit.start(), orbit.period_s, orbit.parameters)?;
-        let mut orbits = Vec::new();
-        for sign in [-1.0, 1.0] {
-            let axis = problem.parameter_axis(sign);
-            orbits.extend(follow(&problem, guess.clone(), &axis, &settings, |_| true)?.orbits);
-        }
-        Ok(orbits)
-    };
-    both_ways().unwrap_or_default()
+    let one_way = |sign| branch_from(&vehicle, &orbit, sign, &settings, TOLERANCE, |_| true);
+    let both_ways = [-1.0, 1.0].into_iter().filter_map(one_way);
+    both_ways.flat_map(|branch| branch.orbits).collect()
 }
 
 /// The orbit at a scenario's speed, from the nearest of a branch.

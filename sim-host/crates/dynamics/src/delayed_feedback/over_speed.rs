@@ -8,9 +8,6 @@ use super::simulation::{Held, simulate};
 use crate::sweep::{Parameter, RunControl, SweepError, Values, scenarios};
 use shared_model::Scenario;
 
-/// How far the branch of orbits is followed beyond the speeds, rpm.
-const BEYOND_RPM: f64 = 1.0;
-
 /// What a feedback does at one wheel speed.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Point {
@@ -24,7 +21,7 @@ pub struct Point {
     pub best: Best,
     /// The trajectory from the scenario's start under the best gain.
     pub held: Held,
-    /// The same under an impulse per cycle by the whole state.
+    /// The same under an impulse per cycle by the exact state, without noise and latency.
     pub under_impulses: Held,
 }
 
@@ -43,16 +40,9 @@ pub fn over_speed(
     control: RunControl,
 ) -> Result<Vec<Option<Point>>, SweepError> {
     let scenarios = scenarios(scenario, Parameter::Speed, speeds_rpm)?;
-    let (first, last) = scenarios
-        .iter()
-        .fold((f64::INFINITY, 0.0_f64), |(low, high), one| {
-            let rpm = one.run.wheel_speed_rpm;
-            (low.min(rpm), high.max(rpm))
-        });
-    let range = (first - BEYOND_RPM, last + BEYOND_RPM);
     let plant =
         |scenario: &Scenario<f64>| Parameter::Speed.set(plant, scenario.run.wheel_speed_rpm);
-    let branch = interrupt::catch(|| branch_over_speed(&scenarios, range)).unwrap_or_default();
+    let branch = interrupt::catch(|| branch_over_speed(&scenarios)).unwrap_or_default();
     let points = control.points(&scenarios, |scenario| {
         let orbit = Linearised::at(scenario, &orbit_on(&branch, scenario)?)?;
         let delayed = Feedback {

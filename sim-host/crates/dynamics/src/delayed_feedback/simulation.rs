@@ -1,8 +1,9 @@
 //! A trajectory under a torque that is computed at each control tick.
 
-use super::feedback::{Conditions, Feedback};
+use super::feedback::{Conditions, Feedback, LINE_TICKS};
 use super::vehicle::{steps_per_tick, undithered};
 use crate::period::{RIPPLE_TOLERANCE, maxima_of_turns, period_of_maxima};
+use engine::is_bounded;
 use nalgebra::Vector4;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
@@ -13,8 +14,6 @@ use shared_model::vehicle::YAW_RATE;
 use shared_model::{Scenario, integrate};
 use std::collections::VecDeque;
 
-/// Ticks of the delay line: 8 s at a control rate of 1 kHz.
-const LINE: usize = 8192;
 /// Greatest torque of a trajectory that is held, N m; at most half of the limit.
 const HELD_NM: f64 = 0.5;
 /// Part of a simulation at its end from which the torque is taken, s.
@@ -36,15 +35,17 @@ pub struct Held {
     pub maxima: Option<usize>,
     /// The delay at the end, s, if there is one.
     pub delay_s: Option<f64>,
-    /// Least and greatest yaw rate over the last minute, rad/s.
-    pub yaw_rates_rad_per_s: (f64, f64),
+    /// When the vehicle left all bounds, s; the rest is that up to there.
+    pub diverges_at_s: Option<f64>,
+    /// Least and greatest yaw rate over the last minute, rad/s; none if the vehicle left all bounds before.
+    pub yaw_rates_rad_per_s: Option<(f64, f64)>,
 }
 
 /// The trajectory of a vehicle without dither, the feedback being computed at the control rate and switched on after
 /// a while. The torque is held over a control tick.
 pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditions) -> Held {
     let tick_s = 1.0 / plant.run.control_rate_hz;
-    let mut law = DelayedFeedback::<f64, LINE>::new(feedback.law(tick_s));
+    let mut law = DelayedFeedback::<f64, LINE_TICKS>::new(feedback.law(tick_s));
     let mut noise = Noise::new(conditions.noise);
     let mut was_on = false;
     let mut torque_nm = |x: &Vector4<f64>, is_on: bool| {
@@ -85,6 +86,7 @@ pub(super) fn run(
     let held_nm = HELD_NM.min(0.5 * limit_nm);
     let (mut squares, mut peak_nm, mut last_great) = (0.0, 0.0_f64, free);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut diverges_at_s = None;
     let mut turns = Vec::new();
     let mut last = (state.x[YAW_RATE], 0.0);
     for tick in 0..all {
@@ -96,6 +98,10 @@ pub(super) fn run(
         model.set_motor_torque_nm(constant_nm + torque_nm);
         for _ in 0..steps {
             integrate::step(&model, &mut state, step_s, Injection::Off);
+        }
+        if !is_bounded(&state.x) {
+            diverges_at_s = Some((tick + 1) as f64 * tick_s);
+            break;
         }
         if torque_nm.abs() > held_nm {
             last_great = tick;
@@ -116,14 +122,15 @@ pub(super) fn run(
     let maxima = maxima_of_turns(&turns, range);
     // A noisy torque moves the maxima a little.
     let maxima = period_of_maxima(&maxima, range, RIPPLE_TOLERANCE).maxima();
-    let is_captured = maxima.is_some() && last_great < judged;
+    let is_captured = diverges_at_s.is_none() && maxima.is_some() && last_great < judged;
     Held {
         torque_rms_nm: (squares / (all - judged).max(1) as f64).sqrt(),
         torque_peak_nm: peak_nm,
         capture_s: is_captured.then(|| (last_great - free) as f64 * tick_s),
         maxima,
         delay_s: None,
-        yaw_rates_rad_per_s: (low, high),
+        diverges_at_s,
+        yaw_rates_rad_per_s: (low <= high).then_some((low, high)),
     }
 }
 

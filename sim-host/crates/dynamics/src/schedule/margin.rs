@@ -2,7 +2,7 @@
 
 use super::choose::{Entry, Range};
 use super::plan::Plan;
-use crate::attractor::attractors;
+use crate::attractor::{Kind, attractors};
 use crate::settled::{Decay, decay};
 use crate::sweep::{Parameter, RunControl, SweepError, mirrored};
 use shared_model::Scenario;
@@ -63,7 +63,8 @@ pub(super) fn margins(
     let pairs: Vec<_> = starts.iter().zip(&ends).collect();
     let decays = control.points(&pairs, |(scenario, attractor)| {
         let bound = plan.greatest_multiplier;
-        decay(scenario, Parameter::Amplitude, &attractor.end, range, bound)
+        let end = (&attractor.end, attractor.kind == Kind::Equilibrium);
+        decay(scenario, Parameter::Amplitude, end, range, bound)
     });
     let Some(decays) = decays.into_iter().collect::<Option<Vec<_>>>() else {
         return Ok(None);
@@ -111,6 +112,8 @@ pub(super) fn lost(margins: &[Margin]) -> impl Iterator<Item = &Margin> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::attractor::attractor;
+    use crate::sweep::Timing;
 
     fn at(amplitude_v: f64, from_v: f64, to_v: f64) -> Margin {
         Margin {
@@ -137,5 +140,29 @@ mod tests {
         assert_eq!(lost(&bad).collect::<Vec<_>>(), [&bad[1]]);
         bad[1].kept = None;
         assert_eq!(lost(&bad).count(), 1);
+    }
+
+    /// What is left of a perturbation under an amplitude of square wave at 1750 rpm. Chaos has no decay, though there
+    /// are equilibria near it.
+    #[test]
+    fn chaos_has_no_decay_and_orbits_and_rest_have() {
+        let found = |amplitude_v: f64| {
+            let mut scenario = Scenario::reconstruction();
+            scenario.dither.waveform = Waveform::Square;
+            scenario.dither.amplitude_v = amplitude_v;
+            let timing = Timing::new(200.0, 400.0).unwrap();
+            let attractor = attractor(&scenario, timing, true).unwrap();
+            let end = (&attractor.end, attractor.kind == Kind::Equilibrium);
+            let decay = decay(&scenario, Parameter::Amplitude, end, (0.0, 0.2), 0.8);
+            (attractor.kind, decay.map(|decay| decay.multiplier))
+        };
+        let (kind, multiplier) = found(0.0);
+        assert!(kind.is_chaotic() && multiplier.is_none(), "{multiplier:?}");
+        let (kind, multiplier) = found(0.11);
+        assert_eq!(kind, Kind::Periodic(1));
+        assert!(multiplier.is_some_and(|left| left < 0.8), "{multiplier:?}");
+        let (kind, multiplier) = found(0.15);
+        assert_eq!(kind, Kind::Equilibrium);
+        assert!(multiplier.is_some_and(|left| left < 1.0), "{multiplier:?}");
     }
 }
