@@ -188,7 +188,7 @@ fn every_manoeuvre_gives_the_commands_of_the_host_over_the_bus() {
 #[test]
 fn the_dither_is_back_as_soon_as_the_speed_is_known() {
     let mut run = Loop::start(&product(&ecu()));
-    let ramp = (1000.0 * ecu().policy.dither_ramp_s) as u32;
+    let ramp = (1000.0 * ecu().controller.dither_ramp_s) as u32;
     run.ticks(ramp + 20, |packet| packet);
     let before = run.actuation();
     assert_eq!(before.mode, Mode::Active);

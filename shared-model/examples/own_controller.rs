@@ -31,6 +31,7 @@ fn main() {
             measurement: Some(measurement),
             measurement_age_ticks: 1,
             motor_v,
+            feedback_v: 0.0,
             dither_amplitude_v: 0.0,
             found_outside: Faults::NONE,
         });

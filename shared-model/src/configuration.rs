@@ -35,7 +35,7 @@ pub const ERASED: u8 = 0xFF;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Part {
-    /// Vehicle, steering, dither, servo, policy and rates.
+    /// Vehicle, steering, dither, servo, controller and rates.
     Application = 0,
     /// The gate's limits.
     Gate = 1,
@@ -120,6 +120,7 @@ fn pass(part: Part, scenario: &mut Scenario<f32>, values: &mut impl Values) {
     values.choice(&mut scenario.friction.dithered);
     values.choice(&mut scenario.dither.waveform);
     values.choice(&mut scenario.dither.application);
+    values.choice(&mut scenario.controller.suppression);
     values.numbers(&mut scenario.vehicle);
     values.numbers(&mut scenario.tires.front);
     values.numbers(&mut scenario.tires.rear);
@@ -127,7 +128,7 @@ fn pass(part: Part, scenario: &mut Scenario<f32>, values: &mut impl Values) {
     values.numbers(&mut scenario.friction);
     values.numbers(&mut scenario.dither);
     values.numbers(&mut scenario.servo);
-    values.numbers(&mut scenario.policy);
+    values.numbers(&mut scenario.controller);
     values.numbers(&mut scenario.run);
 }
 

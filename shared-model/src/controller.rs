@@ -1,19 +1,38 @@
 //! The controller: the driver's request becomes the motor's share of the servo voltage, the wheel
-//! speed the dither's amplitude. The gate that guards it shares no code with it.
+//! speed the dither's amplitude, and the yaw rate a feedback's share, by what is to suppress the
+//! chaos. The gate that guards it shares no code with it.
+
+mod feedback;
+mod limit;
 
 use crate::Real;
 use crate::ecu_schedule::Table;
 use crate::policy::Policy;
 use crate::scenario::Scenario;
 use crate::signal::Measurement;
+use feedback::OrbitFeedback;
+use limit::within;
 
 /// Command of the controller until the next control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command<T> {
     /// Motor's share of the servo voltage, V.
     pub motor_v: T,
+    /// The delayed feedback's share, V.
+    pub feedback_v: T,
     /// Amplitude of the dither, V.
     pub dither_amplitude_v: T,
+}
+
+impl<T: Real> Command<T> {
+    /// No voltage, no dither.
+    pub fn neutral() -> Self {
+        Self {
+            motor_v: T::zero(),
+            feedback_v: T::zero(),
+            dither_amplitude_v: T::zero(),
+        }
+    }
 }
 
 /// The controller, run once per control tick.
@@ -29,28 +48,38 @@ pub struct Controller<T: Real> {
     /// Greatest change of the amplitude in a control tick, V.
     amplitude_step_v: T,
     motor_current_a: T,
+    /// Greatest magnitude of both shares together, V.
+    limit_v: T,
+    feedback: Option<OrbitFeedback<T>>,
 }
 
 impl<T: Real> Controller<T> {
     /// The controller of a scenario.
     pub fn new(scenario: &Scenario<T>) -> Self {
         let rate_hz = scenario.run.control_rate_hz;
-        let schedule = Table::of(scenario.dither.waveform);
+        let policy = scenario.controller;
+        let schedule = Table::of(scenario.suppressing_waveform());
+        let ticks_to_start = (scenario.dither.start_time_s * rate_hz + T::from_f64(0.5)).to_u32();
         Self {
-            policy: scenario.policy,
+            policy,
             schedule,
             winding_resistance_ohm: scenario.servo.winding_resistance_ohm,
             period_s: T::one() / rate_hz,
-            ticks_to_dither: (scenario.dither.start_time_s * rate_hz + T::from_f64(0.5)).to_u32(),
+            ticks_to_dither: ticks_to_start,
             dither_on: false,
             amplitude_v: T::zero(),
-            amplitude_step_v: schedule.peak_v() / (scenario.policy.dither_ramp_s * rate_hz),
+            amplitude_step_v: schedule.peak_v() / (policy.dither_ramp_s * rate_hz),
             motor_current_a: T::zero(),
+            limit_v: policy.motor_current_a * scenario.servo.winding_resistance_ohm,
+            feedback: policy
+                .suppression
+                .has_feedback()
+                .then(|| OrbitFeedback::new(scenario, ticks_to_start)),
         }
     }
 
-    /// A control tick with the latest valid measurement.
-    pub fn run(&mut self, measurement: &Measurement<T>) -> Command<T> {
+    /// A control tick with the latest valid measurement, which may be that of an earlier tick.
+    pub fn run(&mut self, measurement: &Measurement<T>, is_new: bool) -> Command<T> {
         let speed_rpm = measurement.wheel_speed_rpm;
         self.switch_dither(speed_rpm);
         let wanted_v = if self.dither_on {
@@ -61,11 +90,20 @@ impl<T: Real> Controller<T> {
         self.amplitude_v = towards(self.amplitude_v, wanted_v, self.amplitude_step_v);
 
         let limit = self.policy.motor_current_a;
-        let request = limited(measurement.current_request_a, limit);
+        let request = within(measurement.current_request_a, (-limit, limit));
         let slew = self.policy.motor_slew_a_per_s * self.period_s;
         self.motor_current_a = towards(self.motor_current_a, request, slew);
+        let motor_v = self.motor_current_a * self.winding_resistance_ohm;
+        let feedback_v = match &mut self.feedback {
+            Some(feedback) => {
+                let room_v = (-self.limit_v - motor_v, self.limit_v - motor_v);
+                feedback.run(measurement, is_new, room_v)
+            }
+            None => T::zero(),
+        };
         Command {
-            motor_v: self.motor_current_a * self.winding_resistance_ohm,
+            motor_v,
+            feedback_v,
             dither_amplitude_v: self.amplitude_v,
         }
     }
@@ -93,22 +131,5 @@ impl<T: Real> Controller<T> {
 
 /// `value` moved to `target` by at most `step`.
 fn towards<T: Real>(value: T, target: T, step: T) -> T {
-    if target > value + step {
-        value + step
-    } else if target < value - step {
-        value - step
-    } else {
-        target
-    }
-}
-
-/// `value` cut to magnitude `limit`.
-fn limited<T: Real>(value: T, limit: T) -> T {
-    if value > limit {
-        limit
-    } else if value < -limit {
-        -limit
-    } else {
-        value
-    }
+    within(target, (value - step, value + step))
 }

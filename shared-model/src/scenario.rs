@@ -65,8 +65,8 @@ pub struct Scenario<T> {
     pub dither: Dither<T>,
     /// Servo drive.
     pub servo: Servo<T>,
-    /// The controller's dither policy, for an ECU in the loop.
-    pub policy: Policy<T>,
+    /// The controller's policy, for an ECU in the loop.
+    pub controller: Policy<T>,
     /// The command gate's limits, for an ECU in the loop.
     pub gate: Limits<T>,
     /// Speed, rates, length and start.
@@ -144,7 +144,7 @@ impl<T: Real> Scenario<T> {
                 winding_resistance_ohm: 0.3,
                 timer_clock_hz: 25e6,
             },
-            policy: Policy::reconstruction(),
+            controller: Policy::reconstruction(),
             gate: Limits::reconstruction(),
             run: Run {
                 wheel_speed_rpm: 1750.0,
@@ -182,7 +182,7 @@ impl<T: Real> Scenario<T> {
             friction: self.friction.map(f),
             dither: self.dither.map(f),
             servo: self.servo.map(f),
-            policy: self.policy.map(f),
+            controller: self.controller.map(f),
             gate: self.gate.map(f),
             run: self.run.map(f),
         }
@@ -191,6 +191,27 @@ impl<T: Real> Scenario<T> {
     /// Voltage that drives the motor current through the winding, V.
     pub fn motor_voltage_v(&self) -> T {
         self.steering.motor_current_a * self.servo.winding_resistance_ohm
+    }
+
+    /// Voltage that drives a torque of the motor about the steering axis, V/(N m).
+    ///
+    /// ```
+    /// let scenario = shared_model::Scenario::<f64>::reconstruction();
+    /// assert!((16.38 * scenario.motor_v_per_nm() - scenario.motor_voltage_v()).abs() < 1e-12);
+    /// ```
+    pub fn motor_v_per_nm(&self) -> T {
+        let steering = &self.steering;
+        let nm_per_a = steering.ratio * steering.motor_constant_nm_per_a * steering.efficiency;
+        self.servo.winding_resistance_ohm / nm_per_a
+    }
+
+    /// Waveform of the ECU's dither: none where something else suppresses the chaos.
+    pub fn suppressing_waveform(&self) -> Waveform {
+        if self.controller.suppression.has_dither() {
+            self.dither.waveform
+        } else {
+            Waveform::None
+        }
     }
 
     /// Rate at which the model is stepped, Hz.

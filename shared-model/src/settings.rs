@@ -6,7 +6,7 @@ use crate::dither::{Application, Dither, Waveform};
 use crate::friction::{Friction, FrictionLaw};
 use crate::gate::Limits;
 use crate::parameter::ParameterSet;
-use crate::policy::Policy;
+use crate::policy::{Policy, Suppression};
 use crate::scenario::{Preset, Run, Scenario};
 use crate::servo::Servo;
 use crate::steering::Steering;
@@ -47,7 +47,8 @@ choices!(
     TireModel,
     FrictionLaw,
     Waveform,
-    Application
+    Application,
+    Suppression
 );
 
 impl Choice for bool {
@@ -109,7 +110,7 @@ impl<T: Real> Scenario<T> {
             "friction" => Friction::<T>::range(name),
             "dither" => Dither::<T>::range(name),
             "servo" => Servo::<T>::range(name),
-            "policy" => Policy::<T>::range(name),
+            "controller" => Policy::<T>::range(name),
             "gate" => Limits::<T>::range(name),
             "run" => Run::<T>::range(name),
             _ => None,
@@ -136,7 +137,7 @@ impl<T: Real> Scenario<T> {
             "friction" => self.friction.number(name),
             "dither" => self.dither.number(name),
             "servo" => self.servo.number(name),
-            "policy" => self.policy.number(name),
+            "controller" => self.controller.number(name),
             "gate" => self.gate.number(name),
             "run" => self.run.number(name),
             _ => None,
@@ -170,6 +171,7 @@ impl<T: Real + FromStr> Scenario<T> {
             "friction.dithered" => choose(&mut self.friction.dithered, value),
             "dither.waveform" => choose(&mut self.dither.waveform, value),
             "dither.application" => choose(&mut self.dither.application, value),
+            "controller.suppression" => choose(&mut self.controller.suppression, value),
             _ => self.set_number(key, value),
         }
     }

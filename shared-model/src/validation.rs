@@ -37,7 +37,7 @@ impl<T: Real> Scenario<T> {
         self.friction.validate()?;
         self.dither.validate()?;
         self.servo.validate()?;
-        self.policy.validate()?;
+        self.controller.validate()?;
         self.gate.validate()?;
         self.run.validate()?;
         self.validate_rates()?;

@@ -30,7 +30,7 @@ fn measurement(wheel_speed_rpm: f32, current_request_a: f32) -> Measurement<f32>
 
 /// Amplitude after `ticks` at a speed.
 fn amplitude_v(controller: &mut Controller<f32>, wheel_speed_rpm: f32, ticks: u32) -> f32 {
-    let commands = (0..ticks).map(|_| controller.run(&measurement(wheel_speed_rpm, 0.0)));
+    let commands = (0..ticks).map(|_| controller.run(&measurement(wheel_speed_rpm, 0.0), true));
     commands.last().unwrap().dither_amplitude_v
 }
 
@@ -49,7 +49,9 @@ fn the_request_becomes_a_voltage_within_its_limits() {
         let mut controller = Controller::new(&scenario());
         let mut last_v = 0.0;
         for _ in 0..1401 {
-            let now_v = controller.run(&measurement(1000.0, request_a)).motor_v;
+            let now_v = controller
+                .run(&measurement(1000.0, request_a), true)
+                .motor_v;
             assert!((now_v - last_v).abs() <= STEP_V * 1.001);
             last_v = now_v;
         }
@@ -61,16 +63,16 @@ fn the_request_becomes_a_voltage_within_its_limits() {
 fn the_request_is_approached_in_even_steps_both_ways() {
     let mut controller = Controller::new(&scenario());
     for tick in 1..=1000 {
-        let motor_v = controller.run(&measurement(1000.0, 10.0)).motor_v;
+        let motor_v = controller.run(&measurement(1000.0, 10.0), true).motor_v;
         assert!((motor_v - STEP_V * tick as f32).abs() < 1e-4);
     }
     for tick in 1..=2000 {
-        let motor_v = controller.run(&measurement(1000.0, -10.0)).motor_v;
+        let motor_v = controller.run(&measurement(1000.0, -10.0), true).motor_v;
         assert!((motor_v - (3.0 - STEP_V * tick as f32)).abs() < 1e-4);
     }
     // A target within a step is reached at once.
     let target_a = -10.0 + 0.009;
-    let motor_v = controller.run(&measurement(1000.0, target_a)).motor_v;
+    let motor_v = controller.run(&measurement(1000.0, target_a), true).motor_v;
     assert_eq!(motor_v, target_a * OHM);
 }
 
@@ -79,7 +81,7 @@ fn slew_is_by_time_not_by_tick() {
     let mut scenario = scenario();
     scenario.run.control_rate_hz = 100.0;
     let mut controller = Controller::new(&scenario);
-    let command = controller.run(&measurement(1750.0, 10.0));
+    let command = controller.run(&measurement(1750.0, 10.0), true);
     assert!((command.motor_v - 10.0 * STEP_V).abs() < 1e-6);
     let peak_v = Table::<f32>::of(Waveform::Square).peak_v();
     assert!((command.dither_amplitude_v - peak_v / 50.0).abs() < 1e-6);

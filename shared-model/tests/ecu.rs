@@ -815,14 +815,14 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
     let sine = "dither.waveform=sine";
     for (good, bad, name) in [
         (
-            vec!["policy.motor_current_a=15"],
-            vec!["policy.motor_current_a=15.001"],
-            "policy.motor_current_a =",
+            vec!["controller.motor_current_a=15"],
+            vec!["controller.motor_current_a=15.001"],
+            "controller.motor_current_a =",
         ),
         (
-            vec!["policy.motor_slew_a_per_s=13.33"],
-            vec!["policy.motor_slew_a_per_s=13.34"],
-            "policy.motor_slew_a_per_s =",
+            vec!["controller.motor_slew_a_per_s=13.33"],
+            vec!["controller.motor_slew_a_per_s=13.34"],
+            "controller.motor_slew_a_per_s =",
         ),
         (
             vec!["gate.square_amplitude_v=0.1135"],
@@ -887,8 +887,8 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
             "gate.dither_above_rpm =",
         ),
         (
-            vec!["policy.dither_off_below_rpm=1555"],
-            vec!["policy.hysteresis_rpm=46"],
+            vec!["controller.dither_off_below_rpm=1555"],
+            vec!["controller.hysteresis_rpm=46"],
             "from 1576",
         ),
         (
@@ -908,8 +908,8 @@ fn what_the_gate_would_refuse_is_refused_at_the_start() {
             "gate.weak_dither_s =",
         ),
         (
-            vec!["policy.dither_ramp_s=0.69"],
-            vec!["policy.dither_ramp_s=0.7"],
+            vec!["controller.dither_ramp_s=0.69"],
+            vec!["controller.dither_ramp_s=0.7"],
             "gate.weak_dither_s =",
         ),
         (

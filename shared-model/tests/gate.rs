@@ -43,6 +43,7 @@ fn command(motor_v: f32, dither_amplitude_v: f32) -> Observation<f32> {
         measurement: Some(calm()),
         measurement_age_ticks: 1,
         motor_v,
+        feedback_v: 0.0,
         dither_amplitude_v,
         found_outside: Faults::NONE,
     }
@@ -94,7 +95,7 @@ fn faults_are_bits_with_names() {
         all |= fault;
         assert!(all.contains(fault) && !all.is_empty());
     }
-    assert_eq!(all.bits(), 0x3_FFFF);
+    assert_eq!(all.bits(), 0xF_FFFF);
     assert_eq!(all.iter().collect::<Vec<_>>(), Fault::ALL);
     let mut one = Faults::from(Fault::Readback);
     one |= Faults::from(Fault::FrameAge);
@@ -550,7 +551,7 @@ proptest! {
             for _ in 0..ticks {
                 speed_rpm += (target_rpm - speed_rpm).clamp(-step_rpm, step_rpm);
                 let measurement = Measurement { wheel_speed_rpm: speed_rpm, ..calm() };
-                let given = controller.run(&measurement);
+                let given = controller.run(&measurement, true);
                 supervisor.run(&Observation {
                     measurement: Some(measurement),
                     ..command(given.motor_v, given.dither_amplitude_v)
@@ -700,12 +701,13 @@ prop_compose! {
             1 => any_f32().prop_map(|yaw_rate_rad_per_s| Some(Measurement { yaw_rate_rad_per_s, ..calm() })),
         ],
         motor_v in any_f32(),
+        feedback_v in prop_oneof![10 => Just(0.0), 1 => any_f32()],
         dither_amplitude_v in any_f32(),
         is_change in any::<bool>(),
         bits in prop_oneof![20 => Just(0), 1 => any::<u32>()],
     ) -> (Observation<f32>, bool) {
         let found_outside = Faults::from_bits(bits);
-        (Observation { elapsed_counts, measurement, measurement_age_ticks: 1, motor_v, dither_amplitude_v, found_outside }, is_change)
+        (Observation { elapsed_counts, measurement, measurement_age_ticks: 1, motor_v, feedback_v, dither_amplitude_v, found_outside }, is_change)
     }
 }
 

@@ -23,15 +23,15 @@ macro_rules! each_section {
             + $check::<$t, _>("friction", |s| &mut s.friction)
             + $check::<$t, _>("dither", |s| &mut s.dither)
             + $check::<$t, _>("servo", |s| &mut s.servo)
-            + $check::<$t, _>("policy", |s| &mut s.policy)
+            + $check::<$t, _>("controller", |s| &mut s.controller)
             + $check::<$t, _>("gate", |s| &mut s.gate)
             + $check::<$t, _>("run", |s| &mut s.run)
     };
 }
 
-/// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, policy, gate and
+/// Numbers of a scenario: chassis, two tyres, steering, friction, dither, servo, controller, gate and
 /// run. The sections' lists and the map of a scenario are both held to it.
-const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 5 + 29 + 8;
+const NUMBERS: usize = 5 + 2 * 4 + 8 + 2 + 6 + 3 + 8 + 31 + 8;
 
 /// The floats next to a bound.
 trait Neighbours: Real + FromStr {
@@ -544,7 +544,7 @@ mod file {
         numbers(scenario.tires.front);
         numbers(scenario.steering);
         numbers(scenario.servo);
-        numbers(scenario.policy);
+        numbers(scenario.controller);
         numbers(scenario.gate);
         numbers(scenario.run);
     }

@@ -31,17 +31,18 @@ pub(super) fn check<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
         gate.wheel_speed_sensor_rpm,
     )?;
     check_motor(scenario)?;
+    check_feedback(scenario)?;
     check_dither(scenario)?;
     check_least_dither(scenario)
 }
 
 fn check_motor<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
-    let (policy, gate) = (&scenario.policy, &scenario.gate);
+    let (policy, gate) = (&scenario.controller, &scenario.gate);
     let resistance_ohm = scenario.servo.winding_resistance_ohm;
     let a_per_v = T::from_f64(1.0 + ROUNDING) / resistance_ohm;
     let most_a = gate.motor_voltage_v * a_per_v;
     require(
-        "policy",
+        "controller",
         "motor_current_a",
         policy.motor_current_a,
         T::zero(),
@@ -49,7 +50,7 @@ fn check_motor<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     )?;
     let fastest = gate.motor_slew_v_per_s * a_per_v;
     require(
-        "policy",
+        "controller",
         "motor_slew_a_per_s",
         policy.motor_slew_a_per_s,
         T::zero(),
@@ -57,9 +58,33 @@ fn check_motor<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     )
 }
 
+/// The gate must pass the feedback, which must be able to make room for the driver's share.
+fn check_feedback<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
+    let (policy, gate) = (&scenario.controller, &scenario.gate);
+    if !policy.suppression.has_feedback() {
+        return Ok(());
+    }
+    let nm_per_v = T::from_f64(1.0 + ROUNDING) / scenario.motor_v_per_nm();
+    require(
+        "controller",
+        "feedback_torque_nm",
+        policy.feedback_torque_nm,
+        T::zero(),
+        gate.feedback_voltage_v * nm_per_v,
+    )?;
+    let slowest = policy.motor_slew_a_per_s * scenario.servo.winding_resistance_ohm * nm_per_v;
+    require(
+        "controller",
+        "feedback_slew_nm_per_s",
+        policy.feedback_slew_nm_per_s,
+        slowest,
+        gate.feedback_slew_v_per_s * nm_per_v,
+    )
+}
+
 fn check_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     let (gate, servo) = (&scenario.gate, &scenario.servo);
-    let (amplitude, frequency, limit_v) = match scenario.dither.waveform {
+    let (amplitude, frequency, limit_v) = match scenario.suppressing_waveform() {
         Waveform::None => return Ok(()),
         Waveform::Square => (
             "square_amplitude_v",
@@ -72,8 +97,8 @@ fn check_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
             gate.sine_amplitude_v,
         ),
     };
-    let peak_v = Table::of(scenario.dither.waveform).peak_v();
-    let motor_v = scenario.policy.motor_current_a * servo.winding_resistance_ohm;
+    let peak_v = Table::of(scenario.suppressing_waveform()).peak_v();
+    let motor_v = scenario.controller.motor_current_a * servo.winding_resistance_ohm;
     let unlimited = T::from_f64(1e6);
     // With fewer samples in half a period not even their signs determine a frequency.
     let two_samples = T::from_f64(core::f64::consts::FRAC_PI_2) * scenario.run.pwm_rate_hz;
@@ -100,8 +125,8 @@ fn check_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
 
 /// The gate must pass the scheduled amplitudes above its speed, and the ramp to them.
 fn check_least_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
-    let (gate, policy) = (&scenario.gate, &scenario.policy);
-    let (name, least_v) = match scenario.dither.waveform {
+    let (gate, policy) = (&scenario.gate, &scenario.controller);
+    let (name, least_v) = match scenario.suppressing_waveform() {
         Waveform::None => return Ok(()),
         Waveform::Square => ("square_least_amplitude_v", gate.square_least_amplitude_v),
         Waveform::Sine => ("sine_least_amplitude_v", gate.sine_least_amplitude_v),
@@ -116,7 +141,7 @@ fn check_least_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange>
         on_from_rpm,
         unlimited,
     )?;
-    let table = Table::of(scenario.dither.waveform);
+    let table = Table::of(scenario.suppressing_waveform());
     require(
         "gate",
         name,

@@ -67,24 +67,23 @@ impl<T: Real> Channel<T> {
             .map(|frame| decode_measurement(frame).map(&|signal| T::from_f64(signal.into())));
         // The gate finds a signal that is not a number. It must not enter the state: NaN is not equal
         // to itself, so that the channels would differ for good.
-        if new.is_some_and(|new| new.is_finite()) {
+        let is_new = new.is_some_and(|new| new.is_finite());
+        if is_new {
             self.measurement = new;
         }
         let is_active = self.supervisor.mode() == Mode::Active;
         let mut found_outside = found_outside;
         found_outside.add_if(received.is_invalid && is_active, Fault::FramesInvalid);
         let command = match &self.measurement {
-            Some(measurement) => self.controller.run(measurement),
-            None => Command {
-                motor_v: T::zero(),
-                dither_amplitude_v: T::zero(),
-            },
+            Some(measurement) => self.controller.run(measurement, is_new),
+            None => Command::neutral(),
         };
         let setpoint = self.supervisor.run(&Observation {
             elapsed_counts: input.elapsed_counts,
             measurement: new,
             measurement_age_ticks: received.usable_age_ticks.unwrap_or(0),
             motor_v: command.motor_v,
+            feedback_v: command.feedback_v,
             dither_amplitude_v: command.dither_amplitude_v,
             found_outside,
         });
@@ -244,7 +243,7 @@ mod tests {
         {
             for bit in 0..32 {
                 let mut scenario = Scenario::reconstruction();
-                flip((field.accessor)(&mut scenario.policy), bit);
+                flip((field.accessor)(&mut scenario.controller), bit);
                 let controller = Controller::new(&scenario);
                 let task = damaged(channel, |one| one.controller = controller);
                 assert_found(task, field.name, bit);

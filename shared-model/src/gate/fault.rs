@@ -28,7 +28,7 @@ listed! {
         ControlLate = 8 => "control late",
         /// The controller's command is not a finite number.
         CommandNotANumber = 9 => "command not a number",
-        /// The motor's share of the voltage is above its limit.
+        /// The motor's share of the voltage, or both shares together, are above its limit.
         MotorVoltage = 10 => "motor voltage",
         /// The motor's share of the voltage changes faster than allowed.
         MotorSlew = 11 => "motor slew",
@@ -44,6 +44,10 @@ listed! {
         FramesInvalid = 16 => "frames invalid",
         /// The dither is absent or too weak at a speed that needs it.
         DitherWeak = 17 => "dither weak",
+        /// The delayed feedback's share of the voltage is above its limit.
+        FeedbackVoltage = 18 => "feedback voltage",
+        /// The delayed feedback's share of the voltage changes faster than allowed.
+        FeedbackSlew = 19 => "feedback slew",
     }
 }
 

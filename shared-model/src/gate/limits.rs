@@ -16,6 +16,10 @@ parameters! {
         motor_voltage_v: 0.0..=9.0,
         /// Greatest change of that share, V/s.
         motor_slew_v_per_s: 1e-3..=8.0,
+        /// Greatest magnitude of the delayed feedback's share, V. Both shares together have the limit of the motor's.
+        feedback_voltage_v: 0.0..=3.0,
+        /// Greatest change of that share, V/s.
+        feedback_slew_v_per_s: 1e-3..=50.0,
         /// Greatest amplitude of a square dither, V.
         square_amplitude_v: 0.0..=0.4,
         /// Greatest amplitude of a sine dither, V.
@@ -99,6 +103,8 @@ impl<T: Real> Limits<T> {
         Self {
             motor_voltage_v: number(4.5),
             motor_slew_v_per_s: number(4.0),
+            feedback_voltage_v: number(1.5),
+            feedback_slew_v_per_s: number(25.0),
             square_amplitude_v: number(0.2),
             sine_amplitude_v: number(1.3),
             dither_above_rpm: number(1575.0),

@@ -24,7 +24,7 @@ use crate::Real;
 /// Setpoint of the servo until the next control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setpoint<T> {
-    /// Motor's share of the voltage, V.
+    /// Voltage of the motor, V: its share and the delayed feedback's.
     pub motor_v: T,
     /// Amplitude of the dither, V.
     pub dither_amplitude_v: T,

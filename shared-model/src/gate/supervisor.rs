@@ -22,6 +22,8 @@ pub struct Observation<T> {
     pub measurement_age_ticks: u32,
     /// The controller's command: the motor's share of the voltage, V.
     pub motor_v: T,
+    /// The controller's command: the delayed feedback's share, V.
+    pub feedback_v: T,
     /// The controller's command: the dither's amplitude, V.
     pub dither_amplitude_v: T,
     /// Faults found elsewhere: by the gate at the PWM rate, or by comparing the program's
@@ -45,7 +47,17 @@ struct CommandLimits<T> {
     motor_v: T,
     /// Change of the motor's share in a control tick.
     motor_change_v: T,
+    feedback_v: T,
+    /// Change of the feedback's share in a control tick.
+    feedback_change_v: T,
     dither_amplitude_v: T,
+}
+
+/// The shares of the motor's voltage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Shares<T> {
+    motor_v: T,
+    feedback_v: T,
 }
 
 /// The least dither at the wheel speeds that need it.
@@ -65,7 +77,7 @@ impl<T: Real> LeastDither<T> {
         let limits = &scenario.gate;
         let ticks = |time_s: T| (time_s * scenario.run.control_rate_hz + T::from_f64(0.5)).to_u32();
         Self {
-            amplitude_v: match scenario.dither.waveform {
+            amplitude_v: match scenario.suppressing_waveform() {
                 Waveform::None => T::zero(),
                 Waveform::Square => limits.square_least_amplitude_v,
                 Waveform::Sine => limits.sine_least_amplitude_v,
@@ -112,6 +124,8 @@ pub struct Supervisor<T> {
     found_outside: Faults,
     bridge_on: bool,
     setpoint: Setpoint<T>,
+    /// Of the last command that passed.
+    shares: Shares<T>,
 }
 
 impl<T: Real> Supervisor<T> {
@@ -120,12 +134,18 @@ impl<T: Real> Supervisor<T> {
         let limits = scenario.gate;
         let period_s = T::one() / scenario.run.control_rate_hz;
         let speed_per_rpm = scenario.vehicle.speed_m_per_s(T::one());
-        let amplitude_limit_v = match scenario.dither.waveform {
+        let amplitude_limit_v = match scenario.suppressing_waveform() {
             Waveform::None => T::zero(),
             Waveform::Square => limits.square_amplitude_v,
             Waveform::Sine => limits.sine_amplitude_v,
         };
         let slew_v = limits.motor_slew_v_per_s * period_s;
+        let feedback_limit_v = if scenario.controller.suppression.has_feedback() {
+            limits.feedback_voltage_v
+        } else {
+            T::zero()
+        };
+        let feedback_slew_v = limits.feedback_slew_v_per_s * period_s;
         let rounding = T::from_f64(ROUNDING);
         let counts = T::from_u32(clock_hz) * period_s;
         let tolerance = limits.tick_tolerance * counts;
@@ -134,6 +154,8 @@ impl<T: Real> Supervisor<T> {
             command_limits: CommandLimits {
                 motor_v: limits.motor_voltage_v * (T::one() + rounding),
                 motor_change_v: slew_v + rounding * limits.motor_voltage_v,
+                feedback_v: feedback_limit_v * (T::one() + rounding),
+                feedback_change_v: feedback_slew_v + rounding * feedback_limit_v,
                 dither_amplitude_v: amplitude_limit_v * (T::one() + rounding),
             },
             slew_v,
@@ -147,6 +169,10 @@ impl<T: Real> Supervisor<T> {
             found_outside: Faults::NONE,
             bridge_on: true,
             setpoint: Setpoint::neutral(),
+            shares: Shares {
+                motor_v: T::zero(),
+                feedback_v: T::zero(),
+            },
         }
     }
 
@@ -161,10 +187,16 @@ impl<T: Real> Supervisor<T> {
         }
         self.setpoint = match self.mode {
             Mode::Starting => Setpoint::neutral(),
-            Mode::Active => Setpoint {
-                motor_v: seen.motor_v,
-                dither_amplitude_v: seen.dither_amplitude_v,
-            },
+            Mode::Active => {
+                self.shares = Shares {
+                    motor_v: seen.motor_v,
+                    feedback_v: seen.feedback_v,
+                };
+                Setpoint {
+                    motor_v: seen.motor_v + seen.feedback_v,
+                    dither_amplitude_v: seen.dither_amplitude_v,
+                }
+            }
             Mode::Safe => self.towards_neutral(),
         };
         self.setpoint
@@ -216,15 +248,23 @@ impl<T: Real> Supervisor<T> {
 
     fn command_faults(&self, seen: &Observation<T>) -> Faults {
         let (motor_v, amplitude_v) = (seen.motor_v, seen.dither_amplitude_v);
-        if !(motor_v.is_finite() && amplitude_v.is_finite()) {
+        let feedback_v = seen.feedback_v;
+        if !(motor_v.is_finite() && feedback_v.is_finite() && amplitude_v.is_finite()) {
             return Fault::CommandNotANumber.into();
         }
         let limits = &self.command_limits;
-        let change_v = motor_v - self.setpoint.motor_v;
+        let change_v = motor_v - self.shares.motor_v;
+        let feedback_change_v = feedback_v - self.shares.feedback_v;
+        let is_motor = motor_v.abs() > limits.motor_v;
+        let is_sum = (motor_v + feedback_v).abs() > limits.motor_v;
+        let is_feedback = feedback_v.abs() > limits.feedback_v;
+        let is_feedback_change = feedback_change_v.abs() > limits.feedback_change_v;
         let is_amplitude = amplitude_v >= T::zero() && amplitude_v <= limits.dither_amplitude_v;
         let mut faults = Faults::NONE;
-        faults.add_if(motor_v.abs() > limits.motor_v, Fault::MotorVoltage);
+        faults.add_if(is_motor || is_sum, Fault::MotorVoltage);
         faults.add_if(change_v.abs() > limits.motor_change_v, Fault::MotorSlew);
+        faults.add_if(is_feedback, Fault::FeedbackVoltage);
+        faults.add_if(is_feedback_change, Fault::FeedbackSlew);
         faults.add_if(!is_amplitude, Fault::DitherAmplitude);
         faults
     }

@@ -1,14 +1,15 @@
 //! `sim-host feedback`: unstable orbits held by delayed feedback through the motor.
 
+use super::feedback_table;
 use super::options::{ConfigOptions, load_file};
 use super::outcome::Outcome;
-use super::output::{Destinations, named};
+use super::output::{Destinations, check, named};
 use super::sweep::{check_interrupted, with_progress};
 use anyhow::{bail, ensure};
 use dynamics::component::Component;
 use dynamics::config::validate;
 use dynamics::delayed_feedback::{
-    Cell, Conditions, Feedback, Held, LINE_TICKS, Plan, Point, chart, over_speed, region,
+    Cell, Conditions, Feedback, Held, LONGEST_TICKS, Plan, Point, chart, over_speed, region,
     region_chart,
 };
 use dynamics::sweep::{Parameter, SweepError, Values, scenarios};
@@ -17,13 +18,13 @@ use serde::Serialize;
 use shared_model::Scenario;
 use std::path::PathBuf;
 
-/// Hold the unstable orbit of one cycle by delayed feedback of a sensor through the motor, without
-/// dither.
+/// Hold the unstable orbit of one cycle by delayed feedback of a sensor through the motor.
 ///
 /// The torque K (y(t - T) - y(t)) is added to the motor's constant one at the control rate, T being the
 /// period of the orbit. At each speed the orbit is computed, the gain K with the least multiplier is
 /// chosen from those tried, and the trajectory from the scenario's initial state is simulated, the
-/// feedback being switched on after --free. The torque is about the steering axis.
+/// feedback being switched on after --free. The torque is about the steering axis. The dither, if there
+/// is one, is averaged. With --table the periods and gains that the ECU carries are computed instead.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sim-host feedback --from 1650 --to 1750 --step 50
@@ -33,7 +34,8 @@ use std::path::PathBuf;
   sim-host feedback --from 1750 --to 1750 --region --gain-from 2 \\
       --gain-to 12 --gain-step 2 --time 100 --out region.csv --figure region.svg
   sim-host feedback --from 1750 --to 1750 --signal steering_angle \\
-      --gain-from -100 --gain-to 100 --gain-step 5")]
+      --gain-from -100 --gain-to 100 --gain-step 5
+  sim-host feedback --from 1560 --step 20 --table table.rs")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,
@@ -130,6 +132,14 @@ pub struct Arguments {
     /// [default: the scenario]
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
+    /// Write the ECU's periods and gains at these speeds, without and with its dither, as Rust source, the
+    /// module `shared_model::delayed_feedback::table`; without simulation
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["region", "plant", "out", "json", "figure", "memory", "signal"]
+    )]
+    table: Option<PathBuf>,
     /// At each speed, simulate all gains and 21 errors of the delay, up to --delay-error either way
     #[arg(long)]
     region: bool,
@@ -357,7 +367,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         let rate_hz = scenario.run.control_rate_hz;
         ensure!(
             rate_hz <= MOST_RATE_HZ,
-            "run.control_rate_hz = {}: must be at most {MOST_RATE_HZ} Hz, for a delay line of {LINE_TICKS} ticks",
+            "run.control_rate_hz = {}: must be at most {MOST_RATE_HZ} Hz, for delays of up to {LONGEST_TICKS} ticks",
             Short(rate_hz)
         );
     }
@@ -366,9 +376,24 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         .input()
         .into_iter()
         .chain(named("--plant", &arguments.plant));
-    arguments.destinations.check(inputs)?;
+    let files = arguments.destinations.files().into_iter();
+    let files = files.chain([named("--table", &arguments.table)]);
+    check(inputs, files, arguments.destinations.force)?;
     if arguments.region {
         return over_delay(arguments, &scenario, &speeds, &plan, &plant);
+    }
+    if let Some(path) = &arguments.table {
+        let command = format!(
+            "sim-host feedback --from {from} --to {to} --step {} --gain-from {} --gain-to {} --gain-step {} --table FILE",
+            arguments.step, arguments.gain_from, arguments.gain_to, arguments.gain_step
+        );
+        return feedback_table::run(
+            &scenario,
+            &speeds,
+            &plan,
+            &command,
+            (path, arguments.destinations.force),
+        );
     }
     let begun = with_progress(speeds.count(), |control| {
         over_speed(&scenario, &speeds, &plan, &plant, control)

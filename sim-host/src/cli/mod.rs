@@ -13,6 +13,7 @@ mod emulator;
 mod equilibria;
 mod faults;
 mod feedback;
+mod feedback_table;
 mod firmware;
 mod grid;
 mod groups;

@@ -131,3 +131,11 @@ pub fn time_out(seconds: f64) -> anyhow::Result<Duration> {
     );
     Ok(Duration::from_secs_f64(seconds))
 }
+
+/// A scenario's parameters, as those of the paper and what differs from them.
+pub fn parameters_in_words(scenario: &Scenario<f64>) -> String {
+    match &differences(scenario)[..] {
+        [] => "the paper's (preset `reconstruction`)".to_owned(),
+        differences => format!("the paper's but for {}", differences.join(", ")),
+    }
+}

@@ -1,12 +1,12 @@
 //! `sim-host schedule`: the dither amplitude required at each wheel speed, as the ECU's table.
 
 use super::grid::{GridOptions, TimeOptions};
-use super::options::ConfigOptions;
+use super::options::{ConfigOptions, parameters_in_words};
 use super::outcome::Outcome;
 use super::output::{check, named};
 use super::sweep::with_progress;
 use anyhow::{bail, ensure};
-use dynamics::config::{differences, validate};
+use dynamics::config::validate;
 use dynamics::schedule::cells::Cell;
 use dynamics::schedule::choose::Choice;
 use dynamics::schedule::figure::draw;
@@ -258,11 +258,6 @@ impl Arguments {
 
     /// The command, and what it was run on.
     fn made_by(&self, scenario: &Scenario<f64>) -> Vec<String> {
-        let differences = differences(scenario);
-        let parameters = match &differences[..] {
-            [] => "the paper's (preset `reconstruction`)".to_owned(),
-            _ => format!("the paper's but for {}", differences.join(", ")),
-        };
         vec![
             format!("Made by `sim-host schedule {}", self.axes()),
             format!(
@@ -270,7 +265,7 @@ impl Arguments {
                 self.margin,
                 self.times()
             ),
-            format!("Parameters: {parameters}."),
+            format!("Parameters: {}.", parameters_in_words(scenario)),
         ]
     }
 }

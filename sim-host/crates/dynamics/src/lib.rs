@@ -18,6 +18,7 @@ pub mod flow;
 pub mod lyapunov;
 pub mod map;
 pub mod method;
+mod module_comment;
 pub mod observe;
 pub mod orbit;
 pub mod period;

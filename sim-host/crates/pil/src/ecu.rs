@@ -115,18 +115,16 @@ impl<T: Real> Model<T> {
         let is_active = self.supervisor.mode() == Mode::Active;
         found_outside.add_if(state == State::Invalid && is_active, Fault::FramesInvalid);
         self.measurement = new.filter(Measurement::is_finite).or(self.measurement);
-        let none = Command {
-            motor_v: T::zero(),
-            dither_amplitude_v: T::zero(),
-        };
-        let command = self
-            .measurement
-            .map_or(none, |measurement| self.controller.run(&measurement));
+        let is_new = new.is_some_and(|new| new.is_finite());
+        let command = self.measurement.map_or(Command::neutral(), |measurement| {
+            self.controller.run(&measurement, is_new)
+        });
         let setpoint = self.supervisor.run(&Observation {
             elapsed_counts: self.counts_per_tick,
             measurement: new,
             measurement_age_ticks: age_ticks.unwrap_or(0),
             motor_v: command.motor_v,
+            feedback_v: command.feedback_v,
             dither_amplitude_v: command.dither_amplitude_v,
             found_outside,
         });

@@ -28,7 +28,7 @@ const START_TICKS: u32 = 1 + SENSOR_STATE_MACHINE.min_ok_init as u32;
 /// Control ticks of the lead-in.
 fn lead_in_ticks(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u32 {
     let request_a = manoeuvre.current_request_at(0.0).abs();
-    let slewing_s = request_a / scenario.policy.motor_slew_a_per_s;
+    let slewing_s = request_a / scenario.controller.motor_slew_a_per_s;
     (slewing_s * scenario.run.control_rate_hz + SPARE_TICKS).ceil() as u32
 }
 

@@ -72,7 +72,7 @@ fn the_amplitude_follows_the_speed_without_a_jump() {
     let (scenario, manoeuvre) = example("speed-ramp.toml");
     let run = drive(&scenario, &manoeuvre);
     let table = Table::<f32>::of(scenario.dither.waveform);
-    let step_v = f64::from(table.peak_v()) * TICK_S / scenario.policy.dither_ramp_s;
+    let step_v = f64::from(table.peak_v()) * TICK_S / scenario.controller.dither_ramp_s;
     let mut last_v = 0.0;
     for (record, actuation) in run.records.iter().zip(&run.actuations) {
         let amplitude_v = f64::from(actuation.expect("it has told").dither_amplitude_v);
@@ -82,7 +82,7 @@ fn the_amplitude_follows_the_speed_without_a_jump() {
             record.time_s
         );
         last_v = amplitude_v;
-        let ramp_s = 2.0 * scenario.policy.dither_ramp_s;
+        let ramp_s = 2.0 * scenario.controller.dither_ramp_s;
         if record.time_s > scenario.dither.start_time_s + ramp_s && record.wheel_speed_rpm > 1600.0
         {
             assert!(amplitude_v > 0.1, "{amplitude_v} V at {} s", record.time_s);
@@ -91,7 +91,7 @@ fn the_amplitude_follows_the_speed_without_a_jump() {
     let first = &run.records[0];
     let last = run.records.last().expect("there are ticks");
     for end in [first, last] {
-        let off_below = scenario.policy.dither_off_below_rpm;
+        let off_below = scenario.controller.dither_off_below_rpm;
         assert!(
             end.wheel_speed_rpm < off_below,
             "the ramp begins and ends without dither"

@@ -4,8 +4,10 @@ use crate::component::Component;
 use crate::sweep::Values;
 use shared_model::delayed_feedback::Law;
 
-/// Ticks of the delay line: 8 s at a control rate of 1 kHz.
-pub const LINE_TICKS: usize = 8192;
+/// Values of the delay line: 8 s and more, with the spacing of the ECU's.
+pub(super) const LINE_VALUES: usize = 820;
+/// Longest delay that is analysed, ticks: 8 s at a control rate of 1 kHz.
+pub const LONGEST_TICKS: usize = 8192;
 
 /// A feedback: which signal, how strong, how late.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

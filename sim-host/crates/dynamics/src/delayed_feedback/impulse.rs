@@ -54,7 +54,7 @@ impl Impulse {
     }
 }
 
-/// The trajectory of a vehicle without dither, with an impulse in each cycle that takes no more than the limit.
+/// The trajectory of a vehicle with an impulse in each cycle that takes no more than the limit.
 pub(super) fn simulate(
     plant: &Scenario<f64>,
     orbit: &Linearised,

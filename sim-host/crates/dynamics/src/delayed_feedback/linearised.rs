@@ -1,13 +1,12 @@
 //! The orbit linearised at each control tick, and its multipliers under a feedback.
 
-use super::feedback::{Feedback, LINE_TICKS};
+use super::feedback::{Feedback, LONGEST_TICKS};
 use super::orbit::orbit_of;
-use super::vehicle::{steps_per_tick, undithered};
+use super::vehicle::{steps_per_tick, vehicle};
 use crate::settled::VehicleOrbit;
 use crate::sweep::Values;
 use engine::dual::Dual;
 use nalgebra::{Matrix4, Vector4};
-use shared_model::dither::Injection;
 use shared_model::vehicle::State;
 use shared_model::{Real, Scenario, integrate};
 use std::collections::VecDeque;
@@ -40,7 +39,7 @@ pub(super) struct Tick {
 
 impl Linearised {
     /// The orbit of one cycle nearest to the scenario's trajectory, stable or not; `None` if Newton's method
-    /// finds none, or its period has more ticks than the delay line ([`LINE_TICKS`]).
+    /// finds none, or its period has too many ticks ([`LONGEST_TICKS`]).
     ///
     /// ```
     /// let scenario = shared_model::Scenario::reconstruction();
@@ -55,7 +54,7 @@ impl Linearised {
     pub(super) fn at(scenario: &Scenario<f64>, orbit: &VehicleOrbit) -> Option<Self> {
         let (period_s, start) = (orbit.period_s, *orbit.start());
         let count = (period_s * scenario.run.control_rate_hz).round();
-        if count < 1.0 || count > LINE_TICKS as f64 {
+        if count < 1.0 || count > LONGEST_TICKS as f64 {
             return None;
         }
         let tick_s = period_s / count;
@@ -138,7 +137,8 @@ pub struct Best {
 }
 
 fn ticks(scenario: &Scenario<f64>, start: Vector4<f64>, tick_s: f64, count: usize) -> Vec<Tick> {
-    let (model, torque_nm) = undithered(scenario);
+    let (model, torque_nm, injection) = vehicle(scenario);
+    let dual_injection = injection.map(Dual::constant);
     let mut dual = model.map(&Dual::<5>::constant);
     let mut torque = Dual::constant(torque_nm);
     torque.tangent[4] = 1.0;
@@ -149,8 +149,8 @@ fn ticks(scenario: &Scenario<f64>, start: Vector4<f64>, tick_s: f64, count: usiz
     let mut ticks = Vec::with_capacity(count);
     for _ in 0..count {
         interrupt::check();
-        let mode = model.mode_at(&state.x, Injection::Off);
-        let rate = model.derivative(&state.x, Injection::Off, mode);
+        let mode = model.mode_at(&state.x, injection);
+        let rate = model.derivative(&state.x, injection, mode);
         let mut after = State {
             x: Vector4::from_fn(|i, _| {
                 let mut seeded = Dual::constant(state.x[i]);
@@ -160,7 +160,7 @@ fn ticks(scenario: &Scenario<f64>, start: Vector4<f64>, tick_s: f64, count: usiz
             friction: state.friction,
         };
         for _ in 0..steps {
-            integrate::step(&dual, &mut after, step_s, Injection::Off);
+            integrate::step(&dual, &mut after, step_s, dual_injection);
         }
         ticks.push(Tick {
             by_state: Matrix4::from_fn(|i, k| after.x[i].tangent[k]),

@@ -14,12 +14,14 @@ mod linearised;
 mod orbit;
 mod over_speed;
 mod region;
+mod schedule;
 mod simulation;
 mod vehicle;
 
-pub use feedback::{Conditions, Feedback, LINE_TICKS, Plan};
+pub use feedback::{Conditions, Feedback, LONGEST_TICKS, Plan};
 pub use figure::{chart, region_chart};
 pub use linearised::{Best, Linearised};
 pub use over_speed::{Point, over_speed};
 pub use region::{Cell, region};
+pub use schedule::{Entry, ScheduleError, entries, source};
 pub use simulation::{Held, simulate};

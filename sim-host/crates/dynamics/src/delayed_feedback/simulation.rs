@@ -1,15 +1,14 @@
 //! A trajectory under a torque that is computed at each control tick.
 
-use super::feedback::{Conditions, Feedback, LINE_TICKS};
-use super::vehicle::{steps_per_tick, undithered};
+use super::feedback::{Conditions, Feedback, LINE_VALUES};
+use super::vehicle::{steps_per_tick, vehicle};
 use crate::period::{RIPPLE_TOLERANCE, maxima_of_turns, period_of_maxima};
 use engine::is_bounded;
 use nalgebra::Vector4;
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
-use shared_model::delayed_feedback::DelayedFeedback;
-use shared_model::dither::Injection;
+use shared_model::delayed_feedback::{DelayedFeedback, spacing_ticks};
 use shared_model::vehicle::YAW_RATE;
 use shared_model::{Scenario, integrate};
 use std::collections::VecDeque;
@@ -41,11 +40,12 @@ pub struct Held {
     pub yaw_rates_rad_per_s: Option<(f64, f64)>,
 }
 
-/// The trajectory of a vehicle without dither, the feedback being computed at the control rate and switched on after
+/// The trajectory of a vehicle under the scenario's averaged dither, the feedback being computed at the control rate and switched on after
 /// a while. The torque is held over a control tick.
 pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditions) -> Held {
     let tick_s = 1.0 / plant.run.control_rate_hz;
-    let mut law = DelayedFeedback::<f64, LINE_TICKS>::new(feedback.law(tick_s));
+    let spacing = spacing_ticks(plant.run.control_rate_hz as u32);
+    let mut law = DelayedFeedback::<f64, LINE_VALUES>::new(feedback.law(tick_s), spacing);
     let mut noise = Noise::new(conditions.noise);
     let mut was_on = false;
     let mut torque_nm = |x: &Vector4<f64>, is_on: bool| {
@@ -76,7 +76,7 @@ pub(super) fn run(
     let tick_s = 1.0 / rate_hz;
     let steps = steps_per_tick(plant);
     let step_s = tick_s / f64::from(steps);
-    let (mut model, constant_nm) = undithered(plant);
+    let (mut model, constant_nm, injection) = vehicle(plant);
     let mut state = model.initial_state(plant);
     let mut torques_nm: VecDeque<f64> = std::iter::repeat_n(0.0, latency_ticks).collect();
     let ticks = |time_s: f64| (time_s * rate_hz) as u64;
@@ -97,7 +97,7 @@ pub(super) fn run(
         let torque_nm = torques_nm.pop_front().unwrap_or(0.0);
         model.set_motor_torque_nm(constant_nm + torque_nm);
         for _ in 0..steps {
-            integrate::step(&model, &mut state, step_s, Injection::Off);
+            integrate::step(&model, &mut state, step_s, injection);
         }
         if !is_bounded(&state.x) {
             diverges_at_s = Some((tick + 1) as f64 * tick_s);

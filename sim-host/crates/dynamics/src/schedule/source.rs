@@ -2,11 +2,9 @@
 
 use super::Analysis;
 use super::choose::{Choice, Entry};
+use crate::module_comment::module_comment;
 use shared_model::dither::Waveform;
 use std::fmt::Write;
-
-/// Most columns of a line, as rustfmt is set up.
-const COLUMNS: usize = 100;
 
 /// What the remarks in the table mean.
 const REMARKS: &str = "After each amplitude are its speed, and the range of amplitudes in which \
@@ -19,31 +17,15 @@ const REMARKS: &str = "After each amplitude are its speed, and the range of ampl
 pub fn source(analyses: &[Analysis], made_by: &[String]) -> String {
     let points = analyses.first().map_or(0, |one| one.entries.len());
     let mut text = String::from("//! The ECU's dither schedules.\n//!\n");
-    text += &comment(&made_by.join(" "));
+    text += &module_comment(&made_by.join(" "));
     text += "//!\n";
-    text += &comment(REMARKS);
+    text += &module_comment(REMARKS);
     text += "\nuse crate::schedule::Schedule;\n\n/// Wheel speeds of a schedule.\n";
     text += &format!("pub const POINTS: usize = {points};\n");
     for analysis in analyses {
         text += &table(analysis);
     }
     text
-}
-
-/// A text in lines of a module's comment.
-fn comment(text: &str) -> String {
-    let mut lines = String::new();
-    let mut line = String::from("//!");
-    for word in text.split(' ') {
-        if line.len() + 1 + word.len() > COLUMNS {
-            lines += &line;
-            lines.push('\n');
-            line = String::from("//!");
-        }
-        line.push(' ');
-        line += word;
-    }
-    lines + &line + "\n"
 }
 
 fn table(analysis: &Analysis) -> String {

@@ -94,7 +94,7 @@ impl Bench {
         scenario.run.duration_s = BENCH_S;
         scenario.dither.waveform = Waveform::Square;
         scenario.dither.start_time_s = 0.0;
-        scenario.policy.dither_ramp_s = BENCH_RAMP_S;
+        scenario.controller.dither_ramp_s = BENCH_RAMP_S;
         Self::new(
             target,
             &scenario,

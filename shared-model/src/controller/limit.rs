@@ -1,0 +1,14 @@
+//! Limits of a value.
+
+use crate::Real;
+
+/// `value`, or the nearer end of the range if it is outside.
+pub(super) fn within<T: Real>(value: T, (least, most): (T, T)) -> T {
+    if value > most {
+        most
+    } else if value < least {
+        least
+    } else {
+        value
+    }
+}
