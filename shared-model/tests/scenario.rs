@@ -4,6 +4,7 @@ use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::gate::Limits;
 use shared_model::parameter::ParameterSet;
+use shared_model::policy::Suppression;
 use shared_model::settings::{Choice, SettingError};
 use shared_model::short::Short;
 use shared_model::tire::TireModel;
@@ -521,6 +522,7 @@ mod file {
         choice::<FrictionLaw>();
         choice::<Waveform>();
         choice::<Application>();
+        choice::<Suppression>();
     }
 
     /// A set of numbers only is read from its `FIELDS` names, all of them, and from no other.
@@ -544,7 +546,6 @@ mod file {
         numbers(scenario.tires.front);
         numbers(scenario.steering);
         numbers(scenario.servo);
-        numbers(scenario.controller);
         numbers(scenario.gate);
         numbers(scenario.run);
     }

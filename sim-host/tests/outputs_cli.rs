@@ -23,7 +23,7 @@ const WRITERS: [(&str, &[&str]); 22] = [
     ("equilibria", &["--out", "--json", "--figure"]),
     ("basin", &["--out", "--json", "--figure"]),
     ("continue", &["--out", "--json", "--figure"]),
-    ("feedback", &["--out", "--json", "--figure"]),
+    ("feedback", &["--out", "--json", "--figure", "--table"]),
     ("phase", &["--out", "--json", "--figure"]),
     ("poincare", &["--out", "--json", "--figure"]),
     ("spectrum", &["--out", "--json", "--figure"]),

@@ -5,6 +5,7 @@ mod common;
 
 use common::{assert_ends, command, folder};
 use std::fs;
+use std::path::Path;
 
 /// Expects exit code 2, a message with all of `parts`, and no file.
 fn assert_refused(line: &str, parts: &[&str]) {
@@ -98,6 +99,16 @@ fn ranges_are_checked() {
         ("--from 300 --to 310 --step 10", &["no orbit of one cycle"]),
         ("--plant missing.toml", &["missing.toml"]),
         ("--step 0.001", &["--step 0.001", "must be at most 1000"]),
+        ("--table t.rs --region", &["--table", "--region"]),
+        ("--table t.rs --to 1640", &["at least two wheel speeds"]),
+        (
+            "--table t.rs --from 1700 --to 1720 --step 20 --gain-from 0 --gain-to 1",
+            &["no gain that was tried holds the orbit at 1700 rpm"],
+        ),
+        (
+            "--table t.rs --from 1960 --to 2400 --step 220",
+            &["at 2180 rpm"],
+        ),
     ] {
         assert_refused(&format!("feedback {option}"), parts);
     }
@@ -250,4 +261,16 @@ fn feedback_needs_a_line_as_long_as_the_period_and_reports_a_divergence() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("diverges"));
     let csv = fs::read_to_string(folder.path().join("o.csv")).expect("written");
     assert!(!csv.contains("NaN") && !csv.contains("inf"), "{csv}");
+}
+
+#[test]
+fn the_ecus_table_of_the_feedback_is_made_again_byte_for_byte() {
+    let folder = folder();
+    let committed =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared-model/src/delayed_feedback/table.rs");
+    let committed = fs::read_to_string(committed).expect("it is there");
+    let line = "feedback --from 1560 --step 20 --gain-step 0.25 --latency 2 --table table.rs";
+    assert_ends(&mut command(folder.path(), line.split_whitespace()), 0);
+    let made = fs::read_to_string(folder.path().join("table.rs")).expect("written");
+    assert_eq!(made, committed);
 }

@@ -22,6 +22,10 @@ pub struct Law<T> {
 /// Greatest change of the delay by adaptation, as a share of the law's.
 pub(super) const MOST_ADAPTED: f64 = 0.1;
 
+/// Torque below which the delay adapts, as a share of the limit: the great differences of the chaos before the capture
+/// say nothing of the orbit's period.
+const ADAPTS_BELOW: f64 = 0.25;
+
 /// The feedback with its delay line of `N` values.
 ///
 /// ```
@@ -85,12 +89,13 @@ impl<T: Real, const N: usize> DelayedFeedback<T, N> {
             return T::zero();
         };
         let difference = delayed.value - signal;
+        let torque_nm = law.gain * difference;
         // Down the slope of the squared difference over the delay.
         let adapted_ticks = self.adapted_ticks + law.adaptation * difference * delayed.rate;
-        if adapted_ticks.abs() < T::from_f64(MOST_ADAPTED) * law.delay_ticks {
+        let is_in_range = adapted_ticks.abs() < T::from_f64(MOST_ADAPTED) * law.delay_ticks;
+        if is_in_range && torque_nm.abs() < T::from_f64(ADAPTS_BELOW) * law.limit_nm {
             self.adapted_ticks = adapted_ticks;
         }
-        let torque_nm = law.gain * difference;
         self.line
             .push((T::one() - law.memory) * signal + law.memory * delayed.value);
         if torque_nm > law.limit_nm {

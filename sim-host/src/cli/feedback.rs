@@ -35,7 +35,7 @@ use std::path::PathBuf;
       --gain-to 12 --gain-step 2 --time 100 --out region.csv --figure region.svg
   sim-host feedback --from 1750 --to 1750 --signal steering_angle \\
       --gain-from -100 --gain-to 100 --gain-step 5
-  sim-host feedback --from 1560 --step 20 --table table.rs")]
+  sim-host feedback --from 1560 --step 20 --table table.rs  # for the ECU")]
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,
@@ -384,8 +384,12 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     if let Some(path) = &arguments.table {
         let command = format!(
-            "sim-host feedback --from {from} --to {to} --step {} --gain-from {} --gain-to {} --gain-step {} --table FILE",
-            arguments.step, arguments.gain_from, arguments.gain_to, arguments.gain_step
+            "sim-host feedback --from {from} --to {to} --step {} --gain-from {} --gain-to {} --gain-step {} --latency {} --table FILE",
+            arguments.step,
+            arguments.gain_from,
+            arguments.gain_to,
+            arguments.gain_step,
+            arguments.latency
         );
         return feedback_table::run(
             &scenario,

@@ -25,8 +25,12 @@ pub struct Entry {
     pub best: Best,
 }
 
+/// Gain under dither, N m s/rad. The dither holds the orbit by itself, a greater gain makes its multiplier hardly less,
+/// and the ramps of a greater torque leak into the dither of the servo.
+const DITHERED_GAIN: f64 = 1.0;
+
 /// The entries at equally spaced wheel speeds without dither, with the best of the gains, and under the ECU's square
-/// dither with the same gains. `None` where no orbit of one cycle is found; speeds that were not begun before a request
+/// dither with a small gain. `None` where no orbit of one cycle is found; speeds that were not begun before a request
 /// to stop are left out.
 ///
 /// # Errors
@@ -46,8 +50,8 @@ pub fn entries(
     let entries = control.points(&both, |(scenario, dithered)| {
         let best = |orbit: &Linearised| orbit.best_gain(&held_by(feedback, orbit, 0.0), gains);
         let entry = entry(&branch, scenario, best);
-        let same = |orbit: &Linearised| {
-            let gain = entry.map_or(0.0, |entry| entry.best.gain);
+        let small = |orbit: &Linearised| {
+            let gain = DITHERED_GAIN;
             let multiplier = orbit.greatest_multiplier(&held_by(feedback, orbit, gain));
             Best {
                 gain,
@@ -55,7 +59,7 @@ pub fn entries(
                 holding: (multiplier < 1.0).then_some((gain, gain)),
             }
         };
-        [entry, entry.and(self::entry(&other_branch, dithered, same))]
+        [entry, self::entry(&other_branch, dithered, small)]
     });
     Ok(entries.into_iter().flatten().collect())
 }

@@ -1,0 +1,145 @@
+//! Delayed feedback by the ECU in the loop.
+
+use pil::closed_loop::{Run, run};
+use pil::ecu::Software;
+use pil::manoeuvre::{Manoeuvre, from_text};
+use pil::record::Record;
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
+use shared_model::Scenario;
+use shared_model::delayed_feedback::table::{DITHERED, UNDITHERED};
+use shared_model::dither::Waveform;
+use shared_model::policy::Suppression;
+use shared_model::signal::Mode;
+
+fn scenario(duration_s: f64) -> Scenario<f64> {
+    let mut scenario = Scenario::reconstruction();
+    scenario.controller.suppression = Suppression::DelayedFeedback;
+    scenario.run.duration_s = duration_s;
+    scenario
+}
+
+fn drive(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Run {
+    let mut ecu = Software::new(&ecu_scenario(scenario, manoeuvre)).unwrap();
+    let vehicle = VehicleNode::new(scenario, manoeuvre).unwrap();
+    run(&mut ecu, vehicle, || {}).unwrap()
+}
+
+fn manoeuvre(table: &str) -> Manoeuvre {
+    from_text(&format!("[manoeuvre]\nname = \"test\"\n{table}"))
+        .unwrap()
+        .1
+}
+
+/// Torque of the feedback about the steering axis, N m, at each control tick.
+fn torques_nm(run: &Run, scenario: &Scenario<f64>) -> Vec<f64> {
+    let nm_per_a = scenario.servo.winding_resistance_ohm / scenario.motor_v_per_nm();
+    let of = |record: &Record| (record.motor_current_a - record.current_request_a) * nm_per_a;
+    run.records.iter().map(of).collect()
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|value| value * value).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Root mean square of the yaw rate's change over a period of that many ticks, rad/s, in the last `ticks`.
+fn change_over(period_ticks: usize, run: &Run, ticks: usize) -> f64 {
+    let yaw_rates: Vec<f64> = run.records.iter().map(|r| r.yaw_rate_rad_per_s).collect();
+    let tail = &yaw_rates[yaw_rates.len() - ticks..];
+    let changes: Vec<f64> = tail
+        .iter()
+        .zip(&tail[period_ticks..])
+        .map(|(a, b)| b - a)
+        .collect();
+    rms(&changes)
+}
+
+fn assert_active(run: &Run) {
+    let last = run.actuations.last().unwrap().unwrap();
+    assert_eq!(last.mode, Mode::Active, "faults {:#x}", last.faults);
+}
+
+/// The paper's chaos becomes the orbit, and the torque that remains is that of the PWM's resolution: a count is 0.05
+/// N m.
+#[test]
+fn the_ecu_holds_the_orbit() {
+    for (rpm, most_nm) in [(1650.0, 0.1), (1750.0, 0.1), (1850.0, 0.3)] {
+        let scenario = scenario(90.0);
+        let run = drive(&scenario, &Manoeuvre::constant(rpm, 10.0));
+        assert_active(&run);
+        let torques_nm = torques_nm(&run, &scenario);
+        assert!(rms(&torques_nm[..2900]) < 0.03, "before 3 s");
+        let greatest_nm = torques_nm.iter().fold(0.0, |a: f64, b| a.max(b.abs()));
+        assert!(greatest_nm <= scenario.controller.feedback_torque_nm + 0.1);
+        let last = &torques_nm[torques_nm.len() - 20_000..];
+        assert!(rms(last) < most_nm, "{rpm} rpm: {} N m", rms(last));
+        let period_s = UNDITHERED.at(rpm as f32).unwrap().period_s;
+        let ticks = (1000.0 * period_s).round() as usize;
+        let change = change_over(ticks, &run, 20_000);
+        assert!(change < 0.03, "{rpm} rpm: {change} rad/s");
+        // Without it the same motion is chaotic.
+        let mut free = scenario;
+        free.controller.suppression = Suppression::None;
+        let run = drive(&free, &Manoeuvre::constant(rpm, 10.0));
+        let change = change_over(ticks, &run, 20_000);
+        assert!(change > 0.1, "{rpm} rpm without: {change} rad/s");
+    }
+}
+
+/// Once captured it stays held while the speed changes.
+#[test]
+fn the_orbit_is_held_through_a_ramp_of_the_speed() {
+    let scenario = scenario(140.0);
+    let manoeuvre = manoeuvre(
+        "wheel_speed_rpm = [[0.0, 1750.0], [60.0, 1750.0], [80.0, 1850.0], [120.0, 1650.0]]
+        current_request_a = [[0.0, 10.0]]",
+    );
+    let run = drive(&scenario, &manoeuvre);
+    assert_active(&run);
+    let torques_nm = torques_nm(&run, &scenario);
+    let (ramps, end) = (&torques_nm[60_000..120_000], &torques_nm[130_000..]);
+    assert!(rms(ramps) < 1.0, "{} N m", rms(ramps));
+    assert!(rms(end) < 0.1, "{} N m", rms(end));
+}
+
+/// With the dither beside it the orbit is the dither's, at once.
+#[test]
+fn both_together_give_the_dithers_orbit() {
+    let mut scenario = scenario(20.0);
+    scenario.controller.suppression = Suppression::Both;
+    scenario.dither.waveform = Waveform::Square;
+    let run = drive(&scenario, &Manoeuvre::constant(1750.0, 10.0));
+    assert_active(&run);
+    let period_s = DITHERED.at(1750.0).unwrap().period_s;
+    let ticks = (1000.0 * period_s).round() as usize;
+    let change = change_over(ticks, &run, 8_000);
+    assert!(change < 0.02, "{change} rad/s");
+    let yaw_rates = run.records[12_000..]
+        .iter()
+        .map(|r| r.yaw_rate_rad_per_s.abs());
+    assert!(yaw_rates.fold(0.0, f64::max) < 1.0);
+}
+
+/// Noise, delay and a driver who steers: the ECU stays active and within its limits.
+#[test]
+fn disturbances_end_in_no_fault() {
+    let scenario = scenario(40.0);
+    let limit_a = scenario.controller.motor_current_a + 0.1;
+    let constant = "wheel_speed_rpm = [[0.0, 1750.0]]\ncurrent_request_a = [[0.0, 10.0]]\n";
+    let noisy = manoeuvre(&format!(
+        "{constant}[manoeuvre.sensors.noise]\nyaw_rate_rad_per_s = 0.02"
+    ));
+    let late = manoeuvre(&format!("{constant}[manoeuvre.sensors]\ndelay_ticks = 2"));
+    let steering = manoeuvre(
+        "wheel_speed_rpm = [[0.0, 1750.0]]
+        current_request_a = [[0.0, 10.0], [10.0, 10.0], [10.001, 14.0], [20.0, 14.0], [20.001, 8.0]]",
+    );
+    for manoeuvre in [noisy, late, steering] {
+        let run = drive(&scenario, &manoeuvre);
+        assert_active(&run);
+        assert!(
+            run.records
+                .iter()
+                .all(|r| r.motor_current_a.abs() <= limit_a)
+        );
+    }
+}
