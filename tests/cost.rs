@@ -14,7 +14,7 @@ const IMAGE: &str = "c-reference";
 type Counted = BTreeMap<String, u32>;
 
 /// Scenarios whose instructions are compared.
-const MEASURED: [(&str, &str); 3] = [
+const MEASURED: [(&str, &str); 4] = [
     ("none", ""),
     (
         "square",
@@ -23,6 +23,10 @@ const MEASURED: [(&str, &str); 3] = [
     (
         "sine",
         "dither.waveform=sine dither.amplitude_v=1.0 dither.start_time_s=0.2",
+    ),
+    (
+        "feedback",
+        "controller.suppression=delayed_feedback dither.start_time_s=0.2",
     ),
 ];
 /// The model's alternatives, most of which spend their time in the same library: only bits are

@@ -7,7 +7,6 @@ mod limit;
 
 use crate::Real;
 use crate::ecu_schedule::Table;
-use crate::policy::Policy;
 use crate::scenario::Scenario;
 use crate::signal::Measurement;
 use feedback::OrbitFeedback;
@@ -38,39 +37,42 @@ impl<T: Real> Command<T> {
 /// The controller, run once per control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Controller<T: Real> {
-    policy: Policy<T>,
     schedule: Table<T>,
-    winding_resistance_ohm: T,
-    period_s: T,
+    /// Wheel speeds below which the dither is switched off, and from which on it is switched on, rpm.
+    off_below_rpm: T,
+    on_from_rpm: T,
     ticks_to_dither: u32,
     dither_on: bool,
     amplitude_v: T,
     /// Greatest change of the amplitude in a control tick, V.
     amplitude_step_v: T,
     motor_current_a: T,
-    /// Greatest magnitude of both shares together, V.
-    limit_v: T,
+    /// Greatest magnitude of the motor current, and its greatest change in a control tick, A.
+    most_current_a: T,
+    current_step_a: T,
+    winding_resistance_ohm: T,
     feedback: Option<OrbitFeedback<T>>,
 }
 
 impl<T: Real> Controller<T> {
     /// The controller of a scenario.
     pub fn new(scenario: &Scenario<T>) -> Self {
-        let rate_hz = scenario.run.control_rate_hz;
-        let policy = scenario.controller;
+        let (policy, rate_hz) = (&scenario.controller, scenario.run.control_rate_hz);
         let schedule = Table::of(scenario.suppressing_waveform());
         let ticks_to_start = (scenario.dither.start_time_s * rate_hz + T::from_f64(0.5)).to_u32();
+        let period_s = T::one() / rate_hz;
         Self {
-            policy,
             schedule,
-            winding_resistance_ohm: scenario.servo.winding_resistance_ohm,
-            period_s: T::one() / rate_hz,
+            off_below_rpm: policy.dither_off_below_rpm,
+            on_from_rpm: policy.dither_off_below_rpm + policy.hysteresis_rpm,
             ticks_to_dither: ticks_to_start,
             dither_on: false,
             amplitude_v: T::zero(),
             amplitude_step_v: schedule.peak_v() / (policy.dither_ramp_s * rate_hz),
             motor_current_a: T::zero(),
-            limit_v: policy.motor_current_a * scenario.servo.winding_resistance_ohm,
+            most_current_a: policy.motor_current_a,
+            current_step_a: policy.motor_slew_a_per_s * period_s,
+            winding_resistance_ohm: scenario.servo.winding_resistance_ohm,
             feedback: policy
                 .suppression
                 .has_feedback()
@@ -89,16 +91,12 @@ impl<T: Real> Controller<T> {
         };
         self.amplitude_v = towards(self.amplitude_v, wanted_v, self.amplitude_step_v);
 
-        let limit = self.policy.motor_current_a;
-        let request = within(measurement.current_request_a, (-limit, limit));
-        let slew = self.policy.motor_slew_a_per_s * self.period_s;
-        self.motor_current_a = towards(self.motor_current_a, request, slew);
+        let most_a = self.most_current_a;
+        let request_a = within(measurement.current_request_a, (-most_a, most_a));
+        self.motor_current_a = towards(self.motor_current_a, request_a, self.current_step_a);
         let motor_v = self.motor_current_a * self.winding_resistance_ohm;
         let feedback_v = match &mut self.feedback {
-            Some(feedback) => {
-                let room_v = (-self.limit_v - motor_v, self.limit_v - motor_v);
-                feedback.run(measurement, is_new, room_v)
-            }
+            Some(feedback) => feedback.run(measurement, is_new, motor_v),
             None => T::zero(),
         };
         Command {
@@ -120,10 +118,9 @@ impl<T: Real> Controller<T> {
             self.ticks_to_dither -= 1;
             return;
         }
-        let off_below = self.policy.dither_off_below_rpm;
-        if speed_rpm < off_below {
+        if speed_rpm < self.off_below_rpm {
             self.dither_on = false;
-        } else if speed_rpm >= off_below + self.policy.hysteresis_rpm {
+        } else if speed_rpm >= self.on_from_rpm {
             self.dither_on = true;
         }
     }

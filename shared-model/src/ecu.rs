@@ -42,6 +42,8 @@ impl<T: Real> Ecu<T> {
     ///
     /// # Errors
     /// If the scenario is not valid, or the gate would refuse its controller's commands.
+    // Out of line: the stack for it is free again when the tasks run.
+    #[inline(never)]
     pub fn new(scenario: &Scenario<T>, clock_hz: u32) -> Result<Self, InvalidScenario> {
         scenario.validate()?;
         consistency::check(scenario)?;

@@ -4,7 +4,6 @@ use shared_model::dither::{Application, Waveform};
 use shared_model::friction::FrictionLaw;
 use shared_model::gate::Limits;
 use shared_model::parameter::ParameterSet;
-use shared_model::policy::Suppression;
 use shared_model::settings::{Choice, SettingError};
 use shared_model::short::Short;
 use shared_model::tire::TireModel;
@@ -504,6 +503,7 @@ fn infinite_settings_are_stopped_by_validate() {
 #[cfg(feature = "serde")]
 mod file {
     use super::*;
+    use shared_model::policy::Suppression;
     use serde::de::value::{Error, MapDeserializer, StrDeserializer};
     use serde::de::{DeserializeOwned, IntoDeserializer};
 

@@ -1,6 +1,7 @@
 /* The task at the control rate: shared-model/src/ecu/control.rs with end-to-end protection, frames, controller and gate. */
 
 #include "channels.h"
+#include "feedback.h"
 #include "gate.h"
 #include "reference.h"
 #include <float.h>
@@ -46,31 +47,34 @@ struct measurement {
     float current_request_a;
 };
 
-struct policy {
-    float dither_off_below_rpm;
-    float hysteresis_rpm;
-    float dither_ramp_s;
-    float motor_current_a;
-    float motor_slew_a_per_s;
+struct command {
+    float motor_v;
+    float feedback_v;
+    float dither_amplitude_v;
 };
 
 struct controller {
-    struct policy policy;
     float schedule_first_rpm;
     float schedule_step_rpm;
     float schedule_amplitudes_v[SCHEDULE_POINTS];
-    float winding_resistance_ohm;
-    float period_s;
+    float off_below_rpm;
+    float on_from_rpm;
     float amplitude_v;
     float amplitude_step_v;
     float motor_current_a;
+    float most_current_a;
+    float current_step_a;
+    float winding_resistance_ohm;
     uint32_t ticks_to_dither;
     uint32_t dither_on;
+    uint32_t has_feedback;
 };
 
 struct limits {
     float motor_voltage_v;
     float motor_slew_v_per_s;
+    float feedback_voltage_v;
+    float feedback_slew_v_per_s;
     float square_amplitude_v;
     float sine_amplitude_v;
     float dither_above_rpm;
@@ -115,6 +119,8 @@ struct supervisor {
     struct plausibility plausibility;
     float most_motor_v;
     float most_motor_change_v;
+    float most_feedback_v;
+    float most_feedback_change_v;
     float most_dither_amplitude_v;
     float slew_v;
     float ramp_v;
@@ -131,6 +137,9 @@ struct supervisor {
     uint32_t found_outside;
     uint32_t bridge_on;
     struct reference_setpoint setpoint;
+    /* Shares of the last command that passed. */
+    float motor_v;
+    float feedback_v;
 };
 
 struct challenger {
@@ -156,6 +165,8 @@ struct channel {
     uint8_t received_counter;
     uint8_t valid_counter;
     uint8_t sent_counter;
+    struct feedback feedback;
+    struct line line;
 };
 
 struct task {
@@ -299,44 +310,34 @@ static inline float scheduled_v(const struct controller *controller, float speed
 
 static inline float towards(float value, float target, float step)
 {
-    if (target > value + step)
-        return value + step;
-    if (target < value - step)
-        return value - step;
-    return target;
-}
-
-static inline float limited(float value, float limit)
-{
-    if (value > limit)
-        return limit;
-    if (value < -limit)
-        return -limit;
-    return value;
+    return within(target, value - step, value + step);
 }
 
 static inline void switch_dither(struct controller *controller, float speed_rpm)
 {
-    const float off_below = controller->policy.dither_off_below_rpm;
-
     if (controller->ticks_to_dither > 0)
         controller->ticks_to_dither--;
-    else if (speed_rpm < off_below)
+    else if (speed_rpm < controller->off_below_rpm)
         controller->dither_on = false;
-    else if (speed_rpm >= off_below + controller->policy.hysteresis_rpm)
+    else if (speed_rpm >= controller->on_from_rpm)
         controller->dither_on = true;
 }
 
-static inline struct reference_setpoint controller_run(struct controller *controller, const struct measurement *now)
+static inline struct command controller_run(struct channel *channel, const struct measurement *now, bool is_new)
 {
+    struct controller *controller = &channel->controller;
+
     switch_dither(controller, now->wheel_speed_rpm);
     const float wanted_v = controller->dither_on ? scheduled_v(controller, now->wheel_speed_rpm) : 0.0f;
     controller->amplitude_v = towards(controller->amplitude_v, wanted_v, controller->amplitude_step_v);
-    const float request = limited(now->current_request_a, controller->policy.motor_current_a);
-    const float slew = controller->policy.motor_slew_a_per_s * controller->period_s;
-    controller->motor_current_a = towards(controller->motor_current_a, request, slew);
-    return (struct reference_setpoint){ controller->motor_current_a * controller->winding_resistance_ohm,
-                                   controller->amplitude_v };
+    const float request = within(now->current_request_a, -controller->most_current_a, controller->most_current_a);
+    controller->motor_current_a = towards(controller->motor_current_a, request, controller->current_step_a);
+    const float motor_v = controller->motor_current_a * controller->winding_resistance_ohm;
+    float feedback_v = 0.0f;
+    if (controller->has_feedback)
+        feedback_v = feedback_run(&channel->feedback, &channel->line, now->wheel_speed_rpm, now->yaw_rate_rad_per_s, is_new,
+                                  motor_v);
+    return (struct command){ motor_v, feedback_v, controller->amplitude_v };
 }
 
 static inline bool is_finite(const struct measurement *now)
@@ -416,15 +417,20 @@ static inline uint32_t check_measurement(struct plausibility *plausibility, cons
     return faults;
 }
 
-static inline uint32_t command_faults(const struct supervisor *supervisor, const struct reference_setpoint *command)
+static inline uint32_t command_faults(const struct supervisor *supervisor, const struct command *command)
 {
-    if (!(isfinite(command->motor_v) && isfinite(command->dither_amplitude_v)))
+    if (!(isfinite(command->motor_v) && isfinite(command->feedback_v) && isfinite(command->dither_amplitude_v)))
         return 1u << FAULT_COMMAND_NOT_A_NUMBER;
-    const float change_v = command->motor_v - supervisor->setpoint.motor_v;
+    const float change_v = command->motor_v - supervisor->motor_v;
+    const float feedback_change_v = command->feedback_v - supervisor->feedback_v;
+    const float sum_v = command->motor_v + command->feedback_v;
     const bool is_amplitude =
         command->dither_amplitude_v >= 0.0f && command->dither_amplitude_v <= supervisor->most_dither_amplitude_v;
-    return fault_if(fabsf(command->motor_v) > supervisor->most_motor_v, FAULT_MOTOR_VOLTAGE) |
+    return fault_if(fabsf(command->motor_v) > supervisor->most_motor_v || fabsf(sum_v) > supervisor->most_motor_v,
+                    FAULT_MOTOR_VOLTAGE) |
            fault_if(fabsf(change_v) > supervisor->most_motor_change_v, FAULT_MOTOR_SLEW) |
+           fault_if(fabsf(command->feedback_v) > supervisor->most_feedback_v, FAULT_FEEDBACK_VOLTAGE) |
+           fault_if(fabsf(feedback_change_v) > supervisor->most_feedback_change_v, FAULT_FEEDBACK_SLEW) |
            fault_if(!is_amplitude, FAULT_DITHER_AMPLITUDE);
 }
 
@@ -445,7 +451,7 @@ static inline bool is_dither_missed(struct supervisor *supervisor, float amplitu
 }
 
 static inline uint32_t judge(struct supervisor *supervisor, const struct measurement *now, uint32_t frame_ticks,
-                             const struct reference_setpoint *command, uint32_t elapsed_counts)
+                             const struct command *command, uint32_t elapsed_counts)
 {
     uint32_t faults = check_measurement(&supervisor->plausibility, &supervisor->limits, now) |
                       command_faults(supervisor, command);
@@ -481,7 +487,7 @@ static inline void towards_neutral(struct supervisor *supervisor)
 }
 
 static inline void supervisor_run(struct supervisor *supervisor, const struct measurement *now, uint32_t frame_ticks,
-                                  const struct reference_setpoint *command, uint32_t elapsed_counts,
+                                  const struct command *command, uint32_t elapsed_counts,
                                   uint32_t found_outside)
 {
     const uint32_t added = found_outside & ~supervisor->found_outside;
@@ -498,9 +504,12 @@ static inline void supervisor_run(struct supervisor *supervisor, const struct me
     }
     if (supervisor->mode == MODE_STARTING)
         supervisor->setpoint = (struct reference_setpoint){ 0.0f, 0.0f };
-    else if (supervisor->mode == MODE_ACTIVE)
-        supervisor->setpoint = *command;
-    else
+    else if (supervisor->mode == MODE_ACTIVE) {
+        supervisor->motor_v = command->motor_v;
+        supervisor->feedback_v = command->feedback_v;
+        supervisor->setpoint =
+            (struct reference_setpoint){ command->motor_v + command->feedback_v, command->dither_amplitude_v };
+    } else
         towards_neutral(supervisor);
 }
 
@@ -516,13 +525,15 @@ static inline struct reference_actuation channel_run(struct channel *channel, co
     const enum communication state = check_state(&channel->state_machine, reception, is_stale);
     const bool is_new = is_fresh && state == VALID;
     bool is_overspeed = false;
-    struct reference_setpoint command = { 0.0f, 0.0f };
+    bool is_finite_now = false;
+    struct command command = { 0.0f, 0.0f, 0.0f };
 
     struct measurement now;
 
     if (is_new) {
         memcpy(&now, input->frame + 4, sizeof now);
-        if (is_finite(&now)) {
+        is_finite_now = is_finite(&now);
+        if (is_finite_now) {
             channel->measurement = now;
             channel->has_measurement = true;
         }
@@ -530,7 +541,7 @@ static inline struct reference_actuation channel_run(struct channel *channel, co
         is_overspeed = now.wheel_speed_rpm > supervisor->limits.wheel_speed_rpm;
     }
     if (channel->has_measurement)
-        command = controller_run(&channel->controller, &channel->measurement);
+        command = controller_run(channel, &channel->measurement, is_finite_now);
     found_outside |= fault_if(state == INVALID && supervisor->mode == MODE_ACTIVE, FAULT_FRAMES_INVALID);
     supervisor_run(supervisor, is_new ? &now : NULL, ticks, &command, input->elapsed_counts,
                    found_outside);
@@ -582,7 +593,7 @@ void reference_control_tick(void *memory, const void *given, void *result)
     struct reference_control_output *output = result;
     struct channel *a = &task->channels[0], *b = &task->channels[1];
     _Alignas(4) uint8_t frame[FRAME_LEN], other_frame[FRAME_LEN];
-    const bool differ = task->frames_differed || !channels_agree(a, b, sizeof *a);
+    const bool differ = task->frames_differed || !channels_agree(a, b, offsetof(struct channel, line));
     const uint32_t found_outside = input->found_by_pwm | fault_if(differ, FAULT_CHANNELS_DIFFER);
     const struct reference_actuation actuation_a = channel_run(a, input, found_outside);
     const struct reference_actuation actuation_b = channel_run(b, input, found_outside);
@@ -602,6 +613,8 @@ void reference_control_tick(void *memory, const void *given, void *result)
 static const struct limits RECONSTRUCTION = {
     .motor_voltage_v = 4.5f,
     .motor_slew_v_per_s = 4.0f,
+    .feedback_voltage_v = 1.5f,
+    .feedback_slew_v_per_s = 25.0f,
     .square_amplitude_v = 0.2f,
     .sine_amplitude_v = 1.3f,
     .dither_above_rpm = 1575.0f,
@@ -645,7 +658,6 @@ static void controller_init(struct controller *controller, const struct referenc
 {
     float peak_v = 0.0f;
 
-    controller->policy = (struct policy){ 1530.0f, 20.0f, 0.5f, 14.0f, 10.0f };
     controller->schedule_first_rpm = choice->schedule_first_rpm;
     controller->schedule_step_rpm = choice->schedule_step_rpm;
     for (int i = 0; i < SCHEDULE_POINTS; i++) {
@@ -654,10 +666,14 @@ static void controller_init(struct controller *controller, const struct referenc
         if (amplitude_v > peak_v)
             peak_v = amplitude_v;
     }
+    controller->off_below_rpm = 1530.0f;
+    controller->on_from_rpm = controller->off_below_rpm + 20.0f;
+    controller->most_current_a = 14.0f;
+    controller->current_step_a = 10.0f * (1.0f / CONTROL_RATE_HZ);
     controller->winding_resistance_ohm = 0.3f;
-    controller->period_s = 1.0f / CONTROL_RATE_HZ;
+    controller->has_feedback = choice->has_feedback;
     controller->ticks_to_dither = (uint32_t)(choice->start_time_s * CONTROL_RATE_HZ + 0.5f);
-    controller->amplitude_step_v = peak_v / (controller->policy.dither_ramp_s * CONTROL_RATE_HZ);
+    controller->amplitude_step_v = peak_v / (0.5f * CONTROL_RATE_HZ);
 }
 
 static void supervisor_init(struct supervisor *supervisor, const struct reference_choice *choice)
@@ -666,8 +682,8 @@ static void supervisor_init(struct supervisor *supervisor, const struct referenc
     const float period_s = 1.0f / CONTROL_RATE_HZ;
     const float counts = (float)choice->clock_hz * period_s;
     const float tolerance = RECONSTRUCTION.tick_tolerance * counts;
-    const float amplitude_limit_v = choice->waveform == WAVEFORM_SQUARE ? RECONSTRUCTION.square_amplitude_v :
-                                    choice->waveform == WAVEFORM_SINE   ? RECONSTRUCTION.sine_amplitude_v :
+    const float amplitude_limit_v = choice->suppressing_waveform == WAVEFORM_SQUARE ? RECONSTRUCTION.square_amplitude_v :
+                                    choice->suppressing_waveform == WAVEFORM_SINE   ? RECONSTRUCTION.sine_amplitude_v :
                                                                           0.0f;
 
     supervisor->limits = RECONSTRUCTION;
@@ -676,14 +692,17 @@ static void supervisor_init(struct supervisor *supervisor, const struct referenc
     supervisor->slew_v = limits->motor_slew_v_per_s * period_s;
     supervisor->most_motor_v = limits->motor_voltage_v * (1.0f + ROUNDING);
     supervisor->most_motor_change_v = supervisor->slew_v + ROUNDING * limits->motor_voltage_v;
+    const float feedback_limit_v = choice->has_feedback ? limits->feedback_voltage_v : 0.0f;
+    supervisor->most_feedback_v = feedback_limit_v * (1.0f + ROUNDING);
+    supervisor->most_feedback_change_v = limits->feedback_slew_v_per_s * period_s + ROUNDING * feedback_limit_v;
     supervisor->most_dither_amplitude_v = amplitude_limit_v * (1.0f + ROUNDING);
     supervisor->ramp_v = amplitude_limit_v * period_s / limits->ramp_out_s;
     supervisor->window_least_counts = (uint32_t)(counts - tolerance);
     supervisor->window_most_counts = (uint32_t)(counts + tolerance);
     const uint32_t ticks = (uint32_t)(limits->frame_age_s * CONTROL_RATE_HZ + 0.5f);
     supervisor->frame_age_ticks = ticks < MIN_AGE_TICKS ? MIN_AGE_TICKS : ticks > MAX_AGE_TICKS ? MAX_AGE_TICKS : ticks;
-    supervisor->least_dither_v = choice->waveform == WAVEFORM_SQUARE ? limits->square_least_amplitude_v :
-                                 choice->waveform == WAVEFORM_SINE   ? limits->sine_least_amplitude_v :
+    supervisor->least_dither_v = choice->suppressing_waveform == WAVEFORM_SQUARE ? limits->square_least_amplitude_v :
+                                 choice->suppressing_waveform == WAVEFORM_SINE   ? limits->sine_least_amplitude_v :
                                                                        0.0f;
     supervisor->max_weak_ticks = (uint32_t)(limits->weak_dither_s * CONTROL_RATE_HZ + 0.5f);
     supervisor->ticks_to_dither = (uint32_t)(choice->start_time_s * CONTROL_RATE_HZ + 0.5f);
@@ -707,6 +726,8 @@ void reference_control_init(void *memory, const struct reference_choice *choice)
         channel->received_counter = UINT8_MAX;
         channel->valid_counter = UINT8_MAX;
         controller_init(&channel->controller, choice);
+        if (choice->has_feedback)
+            feedback_init(&channel->feedback, &channel->line, &choice->orbits, CONTROL_RATE_HZ, channel->controller.ticks_to_dither);
         supervisor_init(&channel->supervisor, choice);
     }
 }

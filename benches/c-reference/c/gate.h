@@ -23,6 +23,8 @@ enum fault {
     FAULT_CHANNELS_DIFFER,
     FAULT_FRAMES_INVALID,
     FAULT_DITHER_WEAK,
+    FAULT_FEEDBACK_VOLTAGE,
+    FAULT_FEEDBACK_SLEW,
 };
 
 static inline uint32_t fault_if(int found, enum fault fault)

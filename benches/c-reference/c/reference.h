@@ -22,10 +22,23 @@ enum injection_kind { INJECTION_OFF, INJECTION_SQUARE_MEAN, INJECTION_SINE_MEAN,
 
 #define FRAME_LEN 24
 #define SCHEDULE_POINTS 41
+#define ORBIT_POINTS 23
+
+/* Periods of the orbits and gains of the delayed feedback: a table that both languages read. */
+struct reference_orbits {
+    float first_rpm;
+    float step_rpm;
+    const float *periods_s;
+    const float *gains;
+};
 
 /* The choices of a scenario. */
 struct reference_choice {
     uint32_t waveform;
+    /* What the ECU suppresses the chaos with: the waveform or none, and the delayed feedback or not. */
+    uint32_t suppressing_waveform;
+    uint32_t has_feedback;
+    struct reference_orbits orbits;
     uint32_t slip_form;
     uint32_t tire;
     uint32_t friction_law;

@@ -2,6 +2,8 @@
 
 use core::ffi::c_void;
 use shared_model::Scenario;
+use shared_model::delayed_feedback::OrbitSchedule;
+use shared_model::delayed_feedback::table::{DITHERED, POINTS as ORBIT_POINTS, UNDITHERED};
 use shared_model::dither::{Injection, Waveform};
 use shared_model::ecu::{ControlInput, ControlOutput};
 use shared_model::exchange::FRAME_LEN;
@@ -15,10 +17,22 @@ use shared_model::vehicle::{SlipForm, State};
 // SAFETY: a type; each call has its own reason.
 pub type Call = unsafe extern "C" fn(*mut c_void, *const c_void, *mut c_void);
 
+/// Periods and gains of the delayed feedback.
+#[repr(C)]
+struct Orbits {
+    first_rpm: f32,
+    step_rpm: f32,
+    periods_s: *const f32,
+    gains: *const f32,
+}
+
 /// The choices of a scenario.
 #[repr(C)]
 pub struct Choice {
     waveform: u32,
+    suppressing_waveform: u32,
+    has_feedback: u32,
+    orbits: Orbits,
     slip_form: u32,
     tire: u32,
     friction_law: u32,
@@ -31,17 +45,38 @@ pub struct Choice {
     clock_hz: u32,
 }
 
+fn number(waveform: Waveform) -> u32 {
+    match waveform {
+        Waveform::None => 0,
+        Waveform::Square => 1,
+        Waveform::Sine => 2,
+    }
+}
+
 static NO_AMPLITUDES: [f32; POINTS] = [0.0; POINTS];
 
 impl Choice {
     pub fn of(scenario: &Scenario<f32>, clock_hz: u32) -> Self {
-        let (waveform, amplitudes_v) = match scenario.dither.waveform {
-            Waveform::None => (0, &NO_AMPLITUDES),
-            Waveform::Square => (1, &SQUARE.amplitudes_v),
-            Waveform::Sine => (2, &SINE.amplitudes_v),
+        let amplitudes_v = match scenario.suppressing_waveform() {
+            Waveform::None => &NO_AMPLITUDES,
+            Waveform::Square => &SQUARE.amplitudes_v,
+            Waveform::Sine => &SINE.amplitudes_v,
         };
+        let orbits: &'static OrbitSchedule<f32, ORBIT_POINTS> =
+            match scenario.suppressing_waveform() {
+                Waveform::None => &UNDITHERED,
+                Waveform::Square | Waveform::Sine => &DITHERED,
+            };
         Self {
-            waveform,
+            waveform: number(scenario.dither.waveform),
+            suppressing_waveform: number(scenario.suppressing_waveform()),
+            has_feedback: scenario.controller.suppression.has_feedback().into(),
+            orbits: Orbits {
+                first_rpm: orbits.first_rpm,
+                step_rpm: orbits.step_rpm,
+                periods_s: orbits.periods_s.as_ptr(),
+                gains: orbits.gains.as_ptr(),
+            },
             slip_form: match scenario.vehicle.slip_form {
                 SlipForm::SmallAngle => 0,
                 SlipForm::Exact => 1,

@@ -38,7 +38,7 @@ const STEPS_PER_TRAJECTORY: u32 = 40;
 /// Memory for a task in C, which reports its size.
 const MODEL_BYTES: usize = 512;
 const PWM_BYTES: usize = 256;
-const CONTROL_BYTES: usize = 1536;
+const CONTROL_BYTES: usize = 2560;
 
 /// Memory of a task in C.
 #[derive(Clone, Copy)]

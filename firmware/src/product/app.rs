@@ -53,22 +53,19 @@ pub fn run() -> ! {
         );
         stay_safe(bus, start);
     }
-    let program = configuration::read().and_then(|scenario| {
-        let ecu = Ecu::new(&scenario, Current::COST_CLOCK_HZ);
-        let ecu = ecu.map_err(ConfigurationError::Invalid)?;
-        Ok((scenario, ecu))
-    });
-    match program {
-        Ok((scenario, ecu)) => steer(&scenario, ecu, bus, start),
-        Err(error) => {
-            defmt::error!("configuration refused: {=str}", error.reason());
-            if let ConfigurationError::Invalid(reason) = &error {
-                log_invalid_scenario(reason);
-            }
-            start.configuration = error.code();
-            stay_safe(bus, start)
-        }
+    let error = match configuration::read() {
+        Ok(scenario) => match Ecu::new(&scenario, Current::COST_CLOCK_HZ) {
+            Ok(ecu) => steer(&scenario, ecu, bus, start),
+            Err(reason) => ConfigurationError::Invalid(reason),
+        },
+        Err(error) => error,
+    };
+    defmt::error!("configuration refused: {=str}", error.reason());
+    if let ConfigurationError::Invalid(reason) = &error {
+        log_invalid_scenario(reason);
     }
+    start.configuration = error.code();
+    stay_safe(bus, start)
 }
 
 /// The history with this start in it.

@@ -15,6 +15,8 @@ static BLOCKS: [u8; CONFIGURATION_LEN] = [ERASED; CONFIGURATION_LEN];
 ///
 /// # Errors
 /// The reason why it is refused.
+// Out of line: the stack for it is free again when the tasks run.
+#[inline(never)]
 pub fn read() -> Result<Scenario<f32>, ConfigurationError> {
     // SAFETY: a read of a static. Volatile, because the bytes are written after the compiler has
     // seen them.

@@ -10,18 +10,40 @@ use crate::signal::Measurement;
 
 /// Holds the orbit of one cycle at the measured wheel speed by a share of the servo voltage, which vanishes on
 /// the orbit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct OrbitFeedback<T> {
+///
+/// Two are equal if all bits of their numbers are, those of the line apart.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OrbitFeedback<T: Real> {
     feedback: DelayedFeedback<T, LINE_LEN>,
-    schedule: OrbitSchedule<T, POINTS>,
+    schedule: &'static OrbitSchedule<f32, POINTS>,
     rate_hz: T,
     hysteresis_rpm: T,
     ticks_to_start: u32,
     is_on: bool,
     volts_per_nm: T,
+    /// Greatest magnitude of both shares of the voltage together, V.
+    most_v: T,
     /// Greatest change in a control tick, V.
     step_v: T,
     voltage_v: T,
+}
+
+/// Without a branch per number: the channels of the ECU are compared in every control tick.
+impl<T: Real> PartialEq for OrbitFeedback<T> {
+    // Out of line: the paper's dither goes without it.
+    #[inline(never)]
+    fn eq(&self, other: &Self) -> bool {
+        let numbers = self.rate_hz.differing_bits(other.rate_hz)
+            | self.hysteresis_rpm.differing_bits(other.hysteresis_rpm)
+            | self.volts_per_nm.differing_bits(other.volts_per_nm)
+            | self.most_v.differing_bits(other.most_v)
+            | self.step_v.differing_bits(other.step_v)
+            | self.voltage_v.differing_bits(other.voltage_v);
+        let counts = (self.ticks_to_start ^ other.ticks_to_start)
+            | u32::from(self.is_on ^ other.is_on)
+            | u32::from(!core::ptr::eq(self.schedule, other.schedule));
+        numbers | u64::from(counts) == 0 && self.feedback == other.feedback
+    }
 }
 
 impl<T: Real> OrbitFeedback<T> {
@@ -29,41 +51,44 @@ impl<T: Real> OrbitFeedback<T> {
     pub fn new(scenario: &Scenario<T>, ticks_to_start: u32) -> Self {
         let (policy, rate_hz) = (&scenario.controller, scenario.run.control_rate_hz);
         let volts_per_nm = scenario.motor_v_per_nm();
-        let schedule = match scenario.suppressing_waveform() {
-            Waveform::None => UNDITHERED,
-            Waveform::Square | Waveform::Sine => DITHERED,
-        };
         let law = Law {
-            gain: T::zero(),
-            delay_ticks: T::one(),
             memory: T::zero(),
             limit_nm: policy.feedback_torque_nm,
             adaptation: policy.feedback_adaptation_s3_per_rad2 * rate_hz,
         };
         Self {
             feedback: DelayedFeedback::new(law, spacing_ticks(rate_hz.to_u32())),
-            schedule: schedule.map(&|value| T::from_f64(value.into())),
+            schedule: match scenario.suppressing_waveform() {
+                Waveform::None => &UNDITHERED,
+                Waveform::Square | Waveform::Sine => &DITHERED,
+            },
             rate_hz,
             hysteresis_rpm: policy.hysteresis_rpm,
             ticks_to_start,
             is_on: false,
             volts_per_nm,
+            most_v: policy.motor_current_a * scenario.servo.winding_resistance_ohm,
             step_v: policy.feedback_slew_nm_per_s * volts_per_nm / rate_hz,
             voltage_v: T::zero(),
         }
     }
 
-    /// A control tick: the feedback's share of the servo voltage, V, within `room_v`, which includes 0. While
-    /// there is no new measurement it stays, and the line takes the last one.
-    pub fn run(&mut self, measurement: &Measurement<T>, is_new: bool, room_v: (T, T)) -> T {
+    /// A control tick: the feedback's share of the servo voltage beside the driver's, V. While there is no new
+    /// measurement it stays, and the line takes the last one.
+    // Out of line: the paper's dither goes without it.
+    #[inline(never)]
+    pub fn run(&mut self, measurement: &Measurement<T>, is_new: bool, motor_v: T) -> T {
         let yaw_rate = measurement.yaw_rate_rad_per_s;
         self.switch(measurement.wheel_speed_rpm);
-        let tuning = self.schedule.at(measurement.wheel_speed_rpm);
+        let tuning = self
+            .schedule
+            .at(measurement.wheel_speed_rpm.to_f64() as f32);
         let wanted_v = match tuning.filter(|_| self.is_on) {
             Some(tuning) if is_new => {
-                self.feedback
-                    .tune(tuning.gain, tuning.period_s * self.rate_hz);
-                self.feedback.run(yaw_rate) * self.volts_per_nm
+                let [gain, period_s] =
+                    [tuning.gain, tuning.period_s].map(|number| T::from_f64(number.into()));
+                let delay_ticks = period_s * self.rate_hz;
+                self.feedback.run(yaw_rate, gain, delay_ticks) * self.volts_per_nm
             }
             Some(_) => {
                 self.feedback.observe(yaw_rate);
@@ -74,7 +99,7 @@ impl<T: Real> OrbitFeedback<T> {
                 T::zero()
             }
         };
-        let wanted_v = within(wanted_v, room_v);
+        let wanted_v = within(wanted_v, (-self.most_v - motor_v, self.most_v - motor_v));
         let (least_v, most_v) = (self.voltage_v - self.step_v, self.voltage_v + self.step_v);
         self.voltage_v = within(wanted_v, (least_v, most_v));
         self.voltage_v
@@ -85,14 +110,18 @@ impl<T: Real> OrbitFeedback<T> {
             self.ticks_to_start -= 1;
             return;
         }
-        let (first_rpm, last_rpm) = (self.schedule.first_rpm, self.schedule.last_rpm());
-        let margin_rpm = self.hysteresis_rpm;
+        let schedule = self.schedule;
+        let [first_rpm, last_rpm] =
+            [schedule.first_rpm, schedule.last_rpm()].map(|number| T::from_f64(number.into()));
         if speed_rpm < first_rpm || speed_rpm > last_rpm {
             self.is_on = false;
-        } else if !self.is_on
-            && speed_rpm >= first_rpm + margin_rpm
-            && speed_rpm <= last_rpm - margin_rpm
-        {
+            return;
+        }
+        if self.is_on {
+            return;
+        }
+        let margin_rpm = self.hysteresis_rpm;
+        if speed_rpm >= first_rpm + margin_rpm && speed_rpm <= last_rpm - margin_rpm {
             self.is_on = true;
             // What it has adapted to before is not the period at this speed.
             self.feedback.restart();

@@ -44,15 +44,23 @@ impl<T: Real, const POINTS: usize> OrbitSchedule<T, POINTS> {
     /// ```
     pub fn at(&self, wheel_speed_rpm: T) -> Option<Tuning<T>> {
         let place = (wheel_speed_rpm - self.first_rpm) / self.step_rpm;
+        let last = POINTS.saturating_sub(1);
         // False for NaN too.
-        if !(place >= T::zero()) {
+        if !(place >= T::zero() && place <= T::from_u32(last as u32)) {
             return None;
         }
         let whole = place.to_u32();
         let share = place - T::from_u32(whole);
+        let slower = whole as usize;
+        // At the last speed itself there is no faster one, nor a share of it.
+        let faster = if slower < last { slower + 1 } else { last };
+        let between = |values: &[T; POINTS]| {
+            let (slower, faster) = (*values.get(slower)?, *values.get(faster)?);
+            Some(slower + share * (faster - slower))
+        };
         Some(Tuning {
-            period_s: between(&self.periods_s, whole as usize, share)?,
-            gain: between(&self.gains, whole as usize, share)?,
+            period_s: between(&self.periods_s)?,
+            gain: between(&self.gains)?,
         })
     }
 
@@ -102,16 +110,6 @@ impl<T: Real, const POINTS: usize> OrbitSchedule<T, POINTS> {
             gains: self.gains.map(f),
         }
     }
-}
-
-/// The value at a place between two of the list; at the last place no share of a next is needed.
-fn between<T: Real>(values: &[T], whole: usize, share: T) -> Option<T> {
-    let first = *values.get(whole)?;
-    if share == T::zero() {
-        return Some(first);
-    }
-    let second = *values.get(whole.checked_add(1)?)?;
-    Some(first + share * (second - first))
 }
 
 /// Why a schedule is refused.

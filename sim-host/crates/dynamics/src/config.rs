@@ -212,6 +212,7 @@ fn merge(base: &mut Table, over: Table, prefix: &str) -> Result<(), ConfigError>
 /// The names that the parameter of that key can have; `None` if it is none with names.
 fn choices(key: &str) -> Option<Vec<&'static str>> {
     use shared_model::dither::{Application, Waveform};
+    use shared_model::policy::Suppression;
     use shared_model::{friction::FrictionLaw, tire::TireModel, vehicle::SlipForm};
     match key {
         "vehicle.slip_form" => Some(names::<SlipForm>()),
@@ -219,6 +220,7 @@ fn choices(key: &str) -> Option<Vec<&'static str>> {
         "friction.law" => Some(names::<FrictionLaw>()),
         "dither.waveform" => Some(names::<Waveform>()),
         "dither.application" => Some(names::<Application>()),
+        "controller.suppression" => Some(names::<Suppression>()),
         _ => None,
     }
 }

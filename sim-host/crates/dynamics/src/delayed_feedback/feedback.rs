@@ -5,7 +5,7 @@ use crate::sweep::Values;
 use shared_model::delayed_feedback::Law;
 
 /// Values of the delay line: 8 s and more, with the spacing of the ECU's.
-pub(super) const LINE_VALUES: usize = 820;
+pub(super) const LINE_VALUES: usize = 412;
 /// Longest delay that is analysed, ticks: 8 s at a control rate of 1 kHz.
 pub const LONGEST_TICKS: usize = 8192;
 
@@ -30,10 +30,8 @@ pub struct Feedback {
 }
 
 impl Feedback {
-    pub(super) fn law(&self, tick_s: f64) -> Law<f64> {
+    pub(super) fn law(&self) -> Law<f64> {
         Law {
-            gain: self.gain,
-            delay_ticks: self.delay_s / tick_s,
             memory: self.memory,
             limit_nm: self.limit_nm,
             adaptation: self.adaptation,

@@ -45,7 +45,7 @@ pub struct Held {
 pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditions) -> Held {
     let tick_s = 1.0 / plant.run.control_rate_hz;
     let spacing = spacing_ticks(plant.run.control_rate_hz as u32);
-    let mut law = DelayedFeedback::<f64, LINE_VALUES>::new(feedback.law(tick_s), spacing);
+    let mut law = DelayedFeedback::<f64, LINE_VALUES>::new(feedback.law(), spacing);
     let mut noise = Noise::new(conditions.noise);
     let mut was_on = false;
     let mut torque_nm = |x: &Vector4<f64>, is_on: bool| {
@@ -54,12 +54,13 @@ pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditi
             law.restart();
         }
         was_on = is_on;
-        law.run(x[feedback.component.index] + noise.next())
+        let signal = x[feedback.component.index] + noise.next();
+        law.run(signal, feedback.gain, feedback.delay_s / tick_s)
     };
     let delayed_by = (feedback.latency_ticks, feedback.limit_nm);
     let held = run(plant, conditions, delayed_by, &mut torque_nm);
     Held {
-        delay_s: Some(law.delay_ticks() * tick_s),
+        delay_s: Some(feedback.delay_s + law.adapted_ticks() * tick_s),
         ..held
     }
 }
