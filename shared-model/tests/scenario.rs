@@ -503,9 +503,9 @@ fn infinite_settings_are_stopped_by_validate() {
 #[cfg(feature = "serde")]
 mod file {
     use super::*;
-    use shared_model::policy::Suppression;
     use serde::de::value::{Error, MapDeserializer, StrDeserializer};
     use serde::de::{DeserializeOwned, IntoDeserializer};
+    use shared_model::policy::Suppression;
 
     fn choice<C: Choice + DeserializeOwned + std::fmt::Debug>() {
         for &choice in C::ALL {

@@ -10,7 +10,7 @@ use std::process::Stdio;
 
 /// Each subcommand that writes files, with the options that name them. What they read need not be
 /// there: outputs come first.
-const WRITERS: [(&str, &[&str]); 22] = [
+const WRITERS: [(&str, &[&str]); 23] = [
     ("simulate", &["--out"]),
     ("lyapunov", &["--out", "--json", "--figure"]),
     (
@@ -23,7 +23,8 @@ const WRITERS: [(&str, &[&str]); 22] = [
     ("equilibria", &["--out", "--json", "--figure"]),
     ("basin", &["--out", "--json", "--figure"]),
     ("continue", &["--out", "--json", "--figure"]),
-    ("feedback", &["--out", "--json", "--figure", "--table"]),
+    ("feedback", &["--out", "--json", "--figure"]),
+    ("feedback", &["--table"]),
     ("phase", &["--out", "--json", "--figure"]),
     ("poincare", &["--out", "--json", "--figure"]),
     ("spectrum", &["--out", "--json", "--figure"]),

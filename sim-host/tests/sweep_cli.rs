@@ -99,16 +99,6 @@ fn ranges_are_checked() {
         ("--from 300 --to 310 --step 10", &["no orbit of one cycle"]),
         ("--plant missing.toml", &["missing.toml"]),
         ("--step 0.001", &["--step 0.001", "must be at most 1000"]),
-        ("--table t.rs --region", &["--table", "--region"]),
-        ("--table t.rs --to 1640", &["at least two wheel speeds"]),
-        (
-            "--table t.rs --from 1700 --to 1720 --step 20 --gain-from 0 --gain-to 1",
-            &["no gain that was tried holds the orbit at 1700 rpm"],
-        ),
-        (
-            "--table t.rs --from 1960 --to 2400 --step 220",
-            &["at 2180 rpm"],
-        ),
     ] {
         assert_refused(&format!("feedback {option}"), parts);
     }
@@ -261,6 +251,25 @@ fn feedback_needs_a_line_as_long_as_the_period_and_reports_a_divergence() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("diverges"));
     let csv = fs::read_to_string(folder.path().join("o.csv")).expect("written");
     assert!(!csv.contains("NaN") && !csv.contains("inf"), "{csv}");
+}
+
+#[test]
+fn a_table_with_a_gap_is_refused() {
+    let folder = folder();
+    for (options, parts) in [
+        ("--region", &["--table", "--region"][..]),
+        ("--out o.csv", &["--table", "--out"]),
+        ("--to 1640", &["at least two wheel speeds"]),
+        (
+            "--from 1700 --to 1720 --step 20 --gain-from 0 --gain-to 1",
+            &["no gain that was tried holds the orbit at 1700 rpm"],
+        ),
+        ("--from 1960 --to 2400 --step 220", &["at 2180 rpm", "gap"]),
+    ] {
+        let line = format!("feedback --table t.rs {options}");
+        common::assert_refused(folder.path(), line.split_whitespace(), parts);
+        assert!(!folder.path().join("t.rs").exists());
+    }
 }
 
 #[test]

@@ -137,7 +137,7 @@ pub struct Arguments {
     #[arg(
         long,
         value_name = "FILE",
-        conflicts_with_all = ["region", "plant", "memory", "signal"]
+        conflicts_with_all = ["region", "plant", "memory", "signal", "out", "json", "figure"]
     )]
     table: Option<PathBuf>,
     /// At each speed, simulate all gains and 21 errors of the delay, up to --delay-error either way

@@ -2,6 +2,7 @@
 //! vehicle that answers?
 
 use super::checks::load;
+use super::feedback;
 use super::job::{Options, Progress, VerifyError};
 use crate::report::DriveReport;
 use pil::comparison::Comparison;
@@ -13,46 +14,72 @@ use qemu::session::LinkKind;
 use qemu::{Machine, RunError};
 use rayon::prelude::*;
 use shared_model::dither::Waveform;
+use shared_model::policy::Suppression;
 
 /// Long enough for the dither, which sets in at 3 s, to take hold.
-const DURATION_S: f64 = 10.0;
+const DITHERED_S: f64 = 10.0;
+/// Long enough for the delayed feedback, which sets in at 3 s, to capture the orbit.
+const FEEDBACK_S: f64 = 40.0;
+
+/// What suppresses the chaos of a manoeuvre.
+#[derive(Clone, Copy)]
+enum By {
+    Dither(Waveform),
+    Feedback,
+}
 
 /// The manoeuvres, driven, with the checks over them.
 pub(super) fn run(
     options: &Options,
     on_progress: &(impl Fn(Progress) + Sync),
 ) -> Result<(Vec<Check>, Vec<DriveReport>), VerifyError> {
-    let driven: Vec<(Vec<Check>, DriveReport)> = [Waveform::Square, Waveform::Sine]
-        .into_par_iter()
-        .map(|waveform| one(waveform, options, on_progress))
-        .collect::<Result<_, _>>()?;
-    let (checks, reports): (Vec<_>, Vec<_>) = driven.into_iter().unzip();
+    // The longest first.
+    let driven: Vec<(Vec<Check>, DriveReport)> = [
+        By::Feedback,
+        By::Dither(Waveform::Square),
+        By::Dither(Waveform::Sine),
+    ]
+    .into_par_iter()
+    .map(|by| one(by, options, on_progress))
+    .collect::<Result<_, _>>()?;
+    let (checks, mut reports): (Vec<_>, Vec<_>) = driven.into_iter().unzip();
+    reports.rotate_left(1);
     Ok((checks.concat(), reports))
 }
 
 fn one(
-    waveform: Waveform,
+    by: By,
     options: &Options,
     on_progress: &(impl Fn(Progress) + Sync),
 ) -> Result<(Vec<Check>, DriveReport), VerifyError> {
     let mut scenario = options.base;
-    scenario.run.duration_s = DURATION_S;
-    scenario.dither.waveform = waveform;
     let base = &options.base;
     let rpm = base.run.wheel_speed_rpm;
     let mut manoeuvre = Manoeuvre::constant(rpm, base.steering.motor_current_a);
-    let name = match waveform {
-        Waveform::Sine => "sine",
-        Waveform::Square | Waveform::None => "square",
+    let (name, what) = match by {
+        By::Dither(Waveform::Sine) => ("sine", "sine dither as scheduled"),
+        By::Dither(Waveform::Square | Waveform::None) => ("square", "square dither as scheduled"),
+        By::Feedback => ("feedback", "delayed feedback"),
     };
-    manoeuvre.name = format!("in the loop, {rpm} rpm, {name} dither as scheduled");
+    match by {
+        By::Dither(waveform) => {
+            scenario.dither.waveform = waveform;
+            scenario.controller.suppression = Suppression::Dither;
+            scenario.run.duration_s = DITHERED_S;
+        }
+        By::Feedback => {
+            scenario.controller.suppression = Suppression::DelayedFeedback;
+            scenario.run.duration_s = FEEDBACK_S;
+        }
+    }
+    manoeuvre.name = format!("in the loop, {rpm} rpm, {what}");
     let target = Target {
         image: options.image.clone(),
         machine: Machine::Mps2An386,
         link: LinkKind::MeasuredTicks,
         time_out: options.time_out,
     };
-    let levels = run_all(&scenario, &manoeuvre, &target, || {}).map_err(|source| {
+    let failed = |source| {
         if matches!(source, LoopError::Run(RunError::Interrupted)) {
             return VerifyError::Interrupted;
         }
@@ -60,11 +87,16 @@ fn one(
             title: manoeuvre.name.clone(),
             source: Box::new(source),
         }
-    })?;
+    };
+    let levels = run_all(&scenario, &manoeuvre, &target, || {}).map_err(failed)?;
     let id = format!("in-loop-{name}");
     let instructions = Instructions::in_loop(&levels.processor.costs, &scenario, target.machine);
     let mut checks = checks(&id, &levels);
     checks.push(load(format!("load/{id}"), &instructions));
+    if matches!(by, By::Feedback) {
+        let run = &levels.processor.run;
+        checks.extend(feedback::checks(&id, &scenario, &manoeuvre, run).map_err(failed)?);
+    }
     on_progress(Progress::Done(format!("{}: driven", levels.name)));
     let report = DriveReport {
         id,

@@ -2,6 +2,7 @@
 
 mod case;
 mod checks;
+mod feedback;
 mod in_loop;
 mod job;
 mod proofs;
