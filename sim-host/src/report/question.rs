@@ -45,11 +45,11 @@ pub const QUESTIONS: [Question; 8] = [
     Question {
         id: "suppression",
         title: "Suppression",
-        text: "Is the regime without dither the paper's, and does the dither suppress the chaos?",
+        text: "Is the regime without dither the paper's, and do dither and delayed feedback suppress the chaos?",
         checks: &[
             "region",
             "chaos",
-            "before-dither",
+            "before",
             "suppressed",
             "signal",
             "averaging",

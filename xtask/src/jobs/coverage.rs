@@ -12,7 +12,12 @@ use crate::outcome::Exit;
 use crate::{process, rustup, workspace};
 
 /// The lines that must be run, all of them.
-const COVERED: [&str; 2] = ["shared-model/src/gate", "shared-model/src/controller.rs"];
+const COVERED: [&str; 4] = [
+    "shared-model/src/gate",
+    "shared-model/src/controller.rs",
+    "shared-model/src/controller",
+    "shared-model/src/delayed_feedback",
+];
 
 /// LLVM's two programs, of the version that the compiler was made with.
 struct Llvm {

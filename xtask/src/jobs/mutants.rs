@@ -14,14 +14,23 @@ use crate::{process, rustup, workspace};
 const TOOL: &str = "cargo-mutants";
 const VERSION: &str = "27.1.0";
 /// The files to mutate.
-const MUTATED: [&str; 4] = [
+const MUTATED: [&str; 6] = [
     "shared-model/src/gate/*.rs",
     "shared-model/src/controller.rs",
+    "shared-model/src/controller/*.rs",
+    "shared-model/src/delayed_feedback/*.rs",
     "shared-model/src/ecu.rs",
     "shared-model/src/ecu/*.rs",
 ];
 /// The tests that have to fail, beside those inside the library.
-const TESTS: [&str; 5] = ["controller", "ecu", "gate", "limiter", "plausibility"];
+const TESTS: [&str; 6] = [
+    "controller",
+    "ecu",
+    "feedback",
+    "gate",
+    "limiter",
+    "plausibility",
+];
 /// The mutations that no test can detect, each below its reason.
 const SURVIVORS: &str = "shared-model/mutants-survivors.txt";
 /// Exit codes of the tool: all caught, some missed, some ran into the time limit.

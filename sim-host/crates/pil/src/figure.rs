@@ -32,7 +32,7 @@ pub fn draw(title: &str, run: &Run) -> String {
             f64::from(actuation.as_ref()?.dither_amplitude_v),
         ))
     });
-    let curves = [
+    let mut curves = vec![
         (
             "wheel speed (rpm)",
             of_record(|record| record.wheel_speed_rpm),
@@ -49,8 +49,11 @@ pub fn draw(title: &str, run: &Run) -> String {
             "motor current (A)",
             of_record(|record| record.motor_current_a),
         ),
-        ("dither amplitude (V)", amplitude.collect()),
     ];
+    let amplitude: Vec<Point> = amplitude.collect();
+    if amplitude.iter().any(|point| point.1 > 0.0) {
+        curves.push(("dither amplitude (V)", amplitude));
+    }
     let end_s = run.records.last().map_or(1.0, |record| record.time_s);
     let heading = format!("In the loop \u{2013} {title}");
     figure(
@@ -65,7 +68,7 @@ pub fn draw(title: &str, run: &Run) -> String {
                     &area,
                     ("", ""),
                     Axis::linear(time, 0.0, end_s, 15),
-                    Axis::around(name, curve.iter().map(|point| point.1), 4),
+                    Axis::around(name, curve.iter().map(|point| point.1), 5),
                 );
                 if let Some(from_s) = safe {
                     panel.band(from_s, end_s);

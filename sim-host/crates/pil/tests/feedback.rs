@@ -143,3 +143,120 @@ fn disturbances_end_in_no_fault() {
         );
     }
 }
+
+/// A condition of the table of robustness: a manoeuvre's settings, and the vehicle's.
+const CONDITIONS: [(&str, &str, &[(&str, f64)]); 21] = [
+    ("none", "", &[]),
+    (
+        "noise 0.001 rad/s",
+        "[manoeuvre.sensors.noise]\nyaw_rate_rad_per_s = 0.001",
+        &[],
+    ),
+    (
+        "noise 0.01 rad/s",
+        "[manoeuvre.sensors.noise]\nyaw_rate_rad_per_s = 0.01",
+        &[],
+    ),
+    (
+        "noise 0.02 rad/s",
+        "[manoeuvre.sensors.noise]\nyaw_rate_rad_per_s = 0.02",
+        &[],
+    ),
+    (
+        "resolution 0.01 rad/s",
+        "[manoeuvre.sensors.resolution]\nyaw_rate_rad_per_s = 0.01",
+        &[],
+    ),
+    ("one tick late", "[manoeuvre.sensors]\ndelay_ticks = 1", &[]),
+    (
+        "two ticks late",
+        "[manoeuvre.sensors]\ndelay_ticks = 2",
+        &[],
+    ),
+    ("mass -10 %", "", &[("vehicle.mass_kg", 0.9)]),
+    ("mass -5 %", "", &[("vehicle.mass_kg", 0.95)]),
+    ("mass +5 %", "", &[("vehicle.mass_kg", 1.05)]),
+    ("mass +10 %", "", &[("vehicle.mass_kg", 1.1)]),
+    (
+        "yaw inertia -10 %",
+        "",
+        &[("vehicle.yaw_inertia_kg_m2", 0.9)],
+    ),
+    (
+        "yaw inertia +10 %",
+        "",
+        &[("vehicle.yaw_inertia_kg_m2", 1.1)],
+    ),
+    ("friction -20 %", "", &[("friction.coefficient", 0.8)]),
+    ("friction +20 %", "", &[("friction.coefficient", 1.2)]),
+    (
+        "front tyre's peak -10 %",
+        "",
+        &[("tires.front.peak_n", 0.9)],
+    ),
+    (
+        "front tyre's peak +10 %",
+        "",
+        &[("tires.front.peak_n", 1.1)],
+    ),
+    (
+        "both tyres' peaks -20 %",
+        "",
+        &[("tires.front.peak_n", 0.8), ("tires.rear.peak_n", 0.8)],
+    ),
+    (
+        "both tyres' peaks -10 %",
+        "",
+        &[("tires.front.peak_n", 0.9), ("tires.rear.peak_n", 0.9)],
+    ),
+    (
+        "both tyres' peaks +10 %",
+        "",
+        &[("tires.front.peak_n", 1.1), ("tires.rear.peak_n", 1.1)],
+    ),
+    (
+        "both tyres' peaks +20 %",
+        "",
+        &[("tires.front.peak_n", 1.2), ("tires.rear.peak_n", 1.2)],
+    ),
+];
+
+/// The table of docs/feedback.md: `cargo test --release -p dithersteer-pil --test feedback -- --ignored --nocapture`.
+#[test]
+#[ignore = "a table of two minutes"]
+fn robustness() {
+    let settings = [
+        ("as it is", Suppression::DelayedFeedback, 1e-3),
+        (
+            "adapting five times as fast",
+            Suppression::DelayedFeedback,
+            5e-3,
+        ),
+        ("without", Suppression::None, 1e-3),
+    ];
+    for (what, suppression, adaptation) in settings {
+        println!("{what}: torque in the last 20 s of 200, N m rms, from four starts");
+        for (condition, sensors, factors) in CONDITIONS {
+            let line = "wheel_speed_rpm = [[0.0, 1750.0]]\ncurrent_request_a = [[0.0, 10.0]]\n";
+            let manoeuvre = manoeuvre(&format!("{line}{sensors}"));
+            let of_start = |start: i32| {
+                let mut scenario = scenario(200.0);
+                scenario.controller.suppression = suppression;
+                scenario.controller.feedback_adaptation_s3_per_rad2 = adaptation;
+                scenario.run.yaw_rate_rad_per_s = 0.1 * f64::from(start);
+                for &(key, factor) in factors {
+                    *scenario.number(key).unwrap() *= factor;
+                }
+                let run = drive(&scenario, &manoeuvre);
+                assert_active(&run);
+                let torques_nm = torques_nm(&run, &scenario);
+                let yaw_rates = run.records[180_000..].iter().map(|r| r.yaw_rate_rad_per_s);
+                let swing =
+                    yaw_rates.clone().fold(f64::MIN, f64::max) - yaw_rates.fold(f64::MAX, f64::min);
+                format!("{:.3} ({swing:.2} rad/s)", rms(&torques_nm[180_000..]))
+            };
+            let cells: Vec<String> = (0..4).map(of_start).collect();
+            println!("| {condition} | {} |", cells.join(" | "));
+        }
+    }
+}

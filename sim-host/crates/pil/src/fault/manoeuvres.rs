@@ -15,7 +15,7 @@ macro_rules! example {
 }
 
 /// Files of the manoeuvres.
-const FILES: [&str; 7] = [
+const FILES: [&str; 8] = [
     example!("constant-speed"),
     example!("constant-speed-sine"),
     example!("speed-ramp"),
@@ -23,6 +23,7 @@ const FILES: [&str; 7] = [
     example!("sine-steer"),
     example!("low-resolution-noise"),
     example!("obeyed-speed-limit"),
+    example!("delayed-feedback"),
 ];
 
 /// All manoeuvres, each with its scenario.

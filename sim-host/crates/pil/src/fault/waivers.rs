@@ -46,7 +46,7 @@ const WAIVERS: [Waiver; 6] = [
             _ => false,
         },
         rationale: "the current request has another value within its range: the driver chooses it, and it may step; the limit and \
-                    the slew of the policy apply",
+                    the slew of the controller apply",
     },
     Waiver {
         covers: |injection| matches!(kind(injection), Some(Kind::ServoBehindReadback(_))),
