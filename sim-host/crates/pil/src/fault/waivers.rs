@@ -8,7 +8,7 @@ use super::processor_fault::{Action, ProcessorFault};
 /// Greatest step of the wheel speed that is plausible for a vehicle, as a share of its range: 20 of
 /// 4000 rpm.
 const WHEEL_SPEED_SHARE: f32 = 0.005;
-/// The same for a signal that does not enter a command.
+/// The same for a signal that enters no command but that of the delayed feedback.
 const MONITORED_SHARE: f32 = 0.03;
 /// First data address of every Cortex-M; code has lower addresses.
 const RAM_START: u32 = 0x2000_0000;
@@ -35,8 +35,8 @@ const WAIVERS: [Waiver; 6] = [
             )) => is_slow(failure, MONITORED_SHARE),
             _ => false,
         },
-        rationale: "the yaw rate, steering angle or steering rate has a small or slow error: they are used for monitoring only and \
-                    do not enter a command",
+        rationale: "the yaw rate, steering angle or steering rate has a small or slow error: no second sensor measures them; only \
+                    the delayed feedback uses one in a command, and its torque keeps its limit",
     },
     Waiver {
         covers: |injection| match kind(injection) {
