@@ -1,6 +1,7 @@
 //! Reproduction of the paper: its figures, its claims, its errata and further measurements.
 //! Complete pieces are kept and not computed again.
 
+mod beyond;
 mod characteristics;
 mod claims;
 mod errata;

@@ -3,7 +3,7 @@
 use super::job::{Options, Quality};
 use super::material::{Made, Material, Named};
 use super::product::Product;
-use super::{characteristics, errata, figures, measures, sensitivity, sweeps};
+use super::{beyond, characteristics, errata, figures, measures, sensitivity, sweeps};
 use dynamics::observe::is_supported;
 use dynamics::sweep::RunControl;
 use std::path::Path;
@@ -52,13 +52,22 @@ const fn part(
 }
 
 /// Parts of the first scenario only: the compared readings include the other preset's.
-const ONCE: [Part; 1] = [part(
-    "sensitivity",
-    "Sensitivity of the edges",
-    &[],
-    [2.3, 2.3],
-    sensitivity::sensitivity,
-)];
+const ONCE: [Part; 2] = [
+    part(
+        "sensitivity",
+        "Sensitivity of the edges",
+        &[],
+        [2.3, 2.3],
+        sensitivity::sensitivity,
+    ),
+    part(
+        "beyond",
+        "Beyond the paper: delayed feedback, within the motor's torque",
+        &[],
+        [50.0, 50.0],
+        beyond::beyond,
+    ),
+];
 
 const PARTS: [Part; 10] = [
     part(

@@ -15,7 +15,7 @@ const CELL_HEIGHT: i32 = 36;
 const GAP: i32 = 3;
 const NUMBER_WIDTH: i32 = 24;
 /// Font size of a column's heading: the longest word of a manoeuvre's name fits the column.
-const HEAD_FONT: u32 = 22;
+const HEAD_FONT: u32 = 20;
 const LINE_STEP: i32 = 28;
 
 /// Verdicts from dark to light, and the colour of text on each shade.
