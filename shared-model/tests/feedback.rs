@@ -1,7 +1,6 @@
 //! The controller's delayed feedback and the gate's view of it.
 
 use proptest::prelude::*;
-use shared_model::Scenario;
 use shared_model::controller::{Command, Controller};
 use shared_model::delayed_feedback::table::{DITHERED, UNDITHERED};
 use shared_model::delayed_feedback::{LINE_LEN, SHORTEST_LINE_S, Tuning, spacing_ticks};
@@ -10,6 +9,7 @@ use shared_model::ecu::Ecu;
 use shared_model::gate::{Fault, Faults, Observation, Supervisor};
 use shared_model::policy::Suppression;
 use shared_model::signal::{Measurement, Mode};
+use shared_model::{Real, Scenario};
 use std::f64::consts::TAU;
 
 const TICKS_PER_S: u32 = 1000;
@@ -43,7 +43,7 @@ fn tuning(wheel_speed_rpm: f32) -> Tuning<f32> {
 
 /// A yaw rate of that period.
 fn yaw_rate(tick: u32, period_s: f32) -> f32 {
-    (TAU * f64::from(tick) / (f64::from(TICKS_PER_S) * f64::from(period_s))).sin() as f32
+    Real::sin(TAU * f64::from(tick) / (f64::from(TICKS_PER_S) * f64::from(period_s))) as f32
 }
 
 /// A controller after enough ticks of a periodic yaw rate, and the next tick.

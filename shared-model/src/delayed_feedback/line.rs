@@ -60,7 +60,8 @@ impl<T: Real, const N: usize> DelayLine<T, N> {
         let spacing = T::from_u32(self.spacing_ticks);
         let place = (ticks - T::from_u32(self.age_ticks)) / spacing;
         // False for NaN too.
-        if !(place >= T::zero()) {
+        let is_past = place >= T::zero();
+        if !is_past {
             return None;
         }
         let whole = place.to_u32();

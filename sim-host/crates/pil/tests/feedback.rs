@@ -144,8 +144,10 @@ fn disturbances_end_in_no_fault() {
     }
 }
 
-/// A condition of the table of robustness: a manoeuvre's settings, and the vehicle's.
-const CONDITIONS: [(&str, &str, &[(&str, f64)]); 21] = [
+/// A condition of the table of robustness: its name, a manoeuvre's settings, and factors of the vehicle's numbers.
+type Condition = (&'static str, &'static str, &'static [(&'static str, f64)]);
+
+const CONDITIONS: [Condition; 21] = [
     ("none", "", &[]),
     (
         "noise 0.001 rad/s",
