@@ -58,7 +58,7 @@ parameters! {
         square_frequency_rad_per_s: 1.0..=1e6,
         /// Angular frequency of the sine, rad/s.
         sine_frequency_rad_per_s: 1.0..=1e6,
-        /// Start time of the dither, s.
+        /// Start time of the dither, s, and of the ECU's delayed feedback.
         start_time_s: 0.0..=1e5,
         /// Angle that one volt of square wave adds ahead of the nonlinearities, rad/V. The paper uses volts as an angle and
         /// gives no conversion.

@@ -46,12 +46,11 @@ const CONTROL_BYTES: usize = 2560;
 struct Memory<const BYTES: usize>([u8; BYTES]);
 
 impl<const BYTES: usize> Memory<BYTES> {
-    /// Memory that `fill` fills; `None` if it needs more.
-    fn new(needed: usize, fill: impl FnOnce(*mut c_void)) -> Option<Self> {
-        let mut memory = Self([0; BYTES]);
+    /// The memory, filled; `None` if the task needs more.
+    fn filled(&mut self, needed: usize, fill: impl FnOnce(*mut c_void)) -> Option<&mut Self> {
         (needed <= BYTES).then(|| {
-            fill((&raw mut memory).cast());
-            memory
+            fill((&raw mut *self).cast());
+            self
         })
     }
 }
@@ -59,11 +58,11 @@ impl<const BYTES: usize> Memory<BYTES> {
 /// One task in both languages.
 struct Pair<T: 'static, const BYTES: usize> {
     name: &'static str,
-    rust: T,
+    rust: &'static mut T,
     rust_call: Call,
     rust_copies: &'static mut Copies<T>,
     rust_tally: &'static mut Tally,
-    c: Memory<BYTES>,
+    c: &'static mut Memory<BYTES>,
     c_call: Call,
     c_copies: &'static mut Copies<Memory<BYTES>>,
     c_tally: &'static mut Tally,
@@ -72,15 +71,9 @@ struct Pair<T: 'static, const BYTES: usize> {
 impl<T: Clone, const BYTES: usize> Pair<T, BYTES> {
     /// The same call in both, counted.
     fn call<RI, RO, CI, CO>(&mut self, rust: (&RI, &mut RO), c: (&CI, &mut CO)) {
-        let instructions = counted(
-            self.rust_call,
-            &mut self.rust,
-            self.rust_copies,
-            rust.0,
-            rust.1,
-        );
+        let instructions = counted(self.rust_call, self.rust, self.rust_copies, rust.0, rust.1);
         self.rust_tally.note(instructions);
-        let instructions = counted(self.c_call, &mut self.c, self.c_copies, c.0, c.1);
+        let instructions = counted(self.c_call, self.c, self.c_copies, c.0, c.1);
         self.c_tally.note(instructions);
     }
 
@@ -101,14 +94,20 @@ impl<T: Clone, const BYTES: usize> Pair<T, BYTES> {
 
 /// Both tasks with their calls, and memory for the rest.
 macro_rules! pair {
-    ($name:literal, $type:ty: $rust:expr, $rust_call:path, $bytes:ident: $c:expr, $c_call:path) => {
+    ($name:literal, $type:ty: $rust:expr, $rust_call:path, $bytes:ident: $choice:expr, $size:path, $init:path, $c_call:path) => {
         Pair {
             name: $name,
-            rust: $rust,
+            rust: cortex_m::singleton!(: $type = $rust)?,
             rust_call: $rust_call,
             rust_copies: cortex_m::singleton!(: Copies<$type> = [const { MaybeUninit::uninit() }; REPEATS])?,
             rust_tally: cortex_m::singleton!(: Tally = Tally::EMPTY)?,
-            c: $c?,
+            // In place: on the stack there is less room.
+            c: cortex_m::singleton!(: Memory<$bytes> = Memory([0; $bytes]))?.filled(
+                // SAFETY: takes nothing.
+                unsafe { $size() },
+                // SAFETY: there is enough of the memory.
+                |memory| unsafe { $init(memory, $choice) },
+            )?,
             c_call: $c_call,
             c_copies: cortex_m::singleton!(: Copies<Memory<$bytes>> = [const { MaybeUninit::uninit() }; REPEATS])?,
             c_tally: cortex_m::singleton!(: Tally = Tally::EMPTY)?,
@@ -176,6 +175,8 @@ unsafe extern "C" fn step(task: *mut c_void, input: *const c_void, _output: *mut
 }
 
 /// Along a motion, and from states on and off it; true if all are equal.
+// Out of line, as the drive: each has the stack for itself.
+#[inline(never)]
 fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
     let model = Model::new(scenario);
     let task = ModelTask {
@@ -183,13 +184,7 @@ fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
         step_s: scenario.step_s(),
         state: model.initial_state(scenario),
     };
-    let reference = Memory::new(
-        // SAFETY: takes nothing.
-        unsafe { interface::reference_model_size() },
-        // SAFETY: there is enough of it.
-        |memory| unsafe { interface::reference_model_init(memory, choice) },
-    );
-    let mut pair = pair!("model-step", ModelTask: task, step, MODEL_BYTES: reference, interface::reference_model_step);
+    let mut pair = pair!("model-step", ModelTask: task, step, MODEL_BYTES: choice, interface::reference_model_size, interface::reference_model_init, interface::reference_model_step);
     let mut random = Random(1);
     let mut injection = Injection::Off;
     let (mut at_rest, mut changes, mut unequal) = (0_u32, 0_u32, 0_u32);
@@ -203,14 +198,14 @@ fn step_model(scenario: &Scenario<f32>, choice: &Choice) -> Option<bool> {
         let before = pair.rust.state.friction;
         let state = StateBits::from(&pair.rust.state);
         // SAFETY: the memory is a model's.
-        unsafe { interface::reference_model_set_state((&raw mut pair.c).cast(), &state) };
+        unsafe { interface::reference_model_set_state((&raw mut *pair.c).cast(), &state) };
         pair.call(
             (&injection, &mut ()),
             (&InjectionOf::from(&injection), &mut ()),
         );
         let mut c = StateBits::default();
         // SAFETY: the memory is a model's.
-        unsafe { interface::reference_model_state((&raw const pair.c).cast(), &mut c) };
+        unsafe { interface::reference_model_state((&raw const *pair.c).cast(), &mut c) };
         let after = pair.rust.state.friction;
         at_rest += u32::from(after == FrictionMode::Sticking);
         changes += u32::from(before != after);
@@ -289,22 +284,11 @@ unsafe extern "C" fn tick(task: *mut c_void, input: *const c_void, output: *mut 
 }
 
 /// A drive; true if all periods and ticks are equal.
+#[inline(never)]
 fn run_ecu(scenario: &Scenario<f32>, ecu: Ecu<f32>, choice: &Choice) -> Option<bool> {
-    let pwm_reference = Memory::new(
-        // SAFETY: takes nothing.
-        unsafe { interface::reference_pwm_size() },
-        // SAFETY: there is enough of it.
-        |memory| unsafe { interface::reference_pwm_init(memory, choice) },
-    );
-    let control_reference = Memory::new(
-        // SAFETY: takes nothing.
-        unsafe { interface::reference_control_size() },
-        // SAFETY: there is enough of it.
-        |memory| unsafe { interface::reference_control_init(memory, choice) },
-    );
     let Ecu { pwm, control, .. } = ecu;
-    let mut pwm = pair!("pwm-period", PwmTask<f32>: pwm, period, PWM_BYTES: pwm_reference, interface::reference_pwm_period);
-    let mut control = pair!("control-tick", ControlTask<f32>: control, tick, CONTROL_BYTES: control_reference, interface::reference_control_tick);
+    let mut pwm = pair!("pwm-period", PwmTask<f32>: pwm, period, PWM_BYTES: choice, interface::reference_pwm_size, interface::reference_pwm_init, interface::reference_pwm_period);
+    let mut control = pair!("control-tick", ControlTask<f32>: control, tick, CONTROL_BYTES: choice, interface::reference_control_size, interface::reference_control_init, interface::reference_control_tick);
     let mut drive = Drive::new(scenario);
     let nominal_counts = Current::COST_CLOCK_HZ / scenario.run.control_rate_hz as u32;
     let mut input = PwmInput {

@@ -331,6 +331,59 @@ mod tests {
         }
     }
 
+    /// The channels do not compare the delay line: a value that differs is found once the feedback reads it.
+    #[test]
+    fn a_changed_value_of_the_delay_line_is_found_when_it_is_read() {
+        let mut scenario = Scenario::<f32>::reconstruction();
+        scenario.controller.suppression = Suppression::DelayedFeedback;
+        scenario.dither.start_time_s = 0.0;
+        // Not periodic: there is a torque.
+        let measured = |tick: u32| Measurement {
+            wheel_speed_rpm: 1750.0,
+            yaw_rate_rad_per_s: 0.3 * Real::sin(0.005 * tick as f32),
+            steering_angle_rad: 0.0,
+            steering_rate_rad_per_s: 0.0,
+            current_request_a: 0.0,
+        };
+        // A tick whose value the line keeps, in the past of the one channel.
+        let changed_tick = 500;
+        let controller = |is_changed: bool| {
+            let mut controller = Controller::new(&scenario);
+            for tick in 0..1000 {
+                let mut measurement = measured(tick);
+                if is_changed && tick == changed_tick {
+                    measurement.yaw_rate_rad_per_s += 0.1;
+                }
+                controller.run(&measurement, true);
+            }
+            controller
+        };
+        let controllers = [controller(false), controller(true)];
+        assert_eq!(controllers[0], controllers[1]);
+        let mut task = ControlTask::new(&scenario, CLOCK_HZ);
+        let mut own = controllers.iter();
+        task.channels
+            .run(|one| one.controller = *own.next().unwrap());
+        let mut sender = Sender::new(SENSOR_DATA_ID);
+        let mut challenge = 0;
+        let found = (1000..4000).find(|&tick| {
+            let output = task.run(&ControlInput {
+                frame: Some(encode_measurement(&measured(tick), challenge, &mut sender)),
+                elapsed_counts: 25_000,
+                ..ControlInput::NOTHING
+            });
+            challenge = output.actuation.challenge;
+            let faults = Faults::from_bits(output.actuation.faults);
+            assert!(faults.is_empty() || faults == Fault::ChannelsDiffer.into());
+            assert_eq!(faults.is_empty(), output.actuation.mode != Mode::Safe);
+            !faults.is_empty()
+        });
+        // Within the four values that the interpolation reads, a period later.
+        let period_ticks = 1687;
+        let found = found.expect("it is found") - changed_tick - period_ticks;
+        assert!((-60..=60).contains(&(found as i32)), "{found}");
+    }
+
     #[test]
     fn a_lower_speed_limit_of_one_channel_is_reported() {
         for channel in [0, 1] {

@@ -72,7 +72,7 @@ pub(super) fn checks(
         )
         .unit("%")
         .detail(format!(
-            "root mean square in the last {JUDGED_S} s; period {} s; yaw rate from {low:.2} to {high:.2} rad/s",
+            "root mean square in the last {JUDGED_S} s; period {} s, the paper's vehicle's; yaw rate from {low:.2} to {high:.2} rad/s",
             tuning.period_s
         )),
         Check::at_most(
