@@ -136,7 +136,7 @@ fn pass(part: Part, scenario: &mut Scenario<f32>, values: &mut impl Values) {
 pub fn layout() -> u16 {
     struct Names(crc::Digest<'static, u16>);
     impl Names {
-        // Out of line: in line, hundred names take 20 kB of flash.
+        // Out of line: in line, a hundred names take 20 kB of flash.
         #[inline(never)]
         fn name(&mut self, name: &str) {
             self.0.update(name.as_bytes());

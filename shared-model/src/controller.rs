@@ -3,14 +3,13 @@
 //! chaos. The gate that guards it shares no code with it.
 
 mod feedback;
-mod limit;
 
 use crate::Real;
 use crate::ecu_schedule::Table;
+use crate::limit::within;
 use crate::scenario::Scenario;
 use crate::signal::Measurement;
 use feedback::OrbitFeedback;
-use limit::within;
 
 /// Command of the controller until the next control tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +47,7 @@ pub struct Controller<T: Real> {
     amplitude_step_v: T,
     motor_current_a: T,
     /// Greatest magnitude of the motor current, and its greatest change in a control tick, A.
-    most_current_a: T,
+    current_limit_a: T,
     current_step_a: T,
     winding_resistance_ohm: T,
     feedback: Option<OrbitFeedback<T>>,
@@ -70,7 +69,7 @@ impl<T: Real> Controller<T> {
             amplitude_v: T::zero(),
             amplitude_step_v: schedule.peak_v() / (policy.dither_ramp_s * rate_hz),
             motor_current_a: T::zero(),
-            most_current_a: policy.motor_current_a,
+            current_limit_a: policy.motor_current_a,
             current_step_a: policy.motor_slew_a_per_s * period_s,
             winding_resistance_ohm: scenario.servo.winding_resistance_ohm,
             feedback: policy
@@ -91,8 +90,8 @@ impl<T: Real> Controller<T> {
         };
         self.amplitude_v = towards(self.amplitude_v, wanted_v, self.amplitude_step_v);
 
-        let most_a = self.most_current_a;
-        let request_a = within(measurement.current_request_a, (-most_a, most_a));
+        let limit_a = self.current_limit_a;
+        let request_a = within(measurement.current_request_a, (-limit_a, limit_a));
         self.motor_current_a = towards(self.motor_current_a, request_a, self.current_step_a);
         let motor_v = self.motor_current_a * self.winding_resistance_ohm;
         let feedback_v = match &mut self.feedback {

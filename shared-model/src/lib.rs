@@ -23,6 +23,7 @@ pub mod friction;
 pub mod gate;
 pub mod independent_clock;
 pub mod integrate;
+mod limit;
 mod listed;
 pub mod open_loop;
 pub mod parameter;

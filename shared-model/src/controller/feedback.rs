@@ -1,10 +1,10 @@
 //! The controller's delayed feedback of the yaw rate, by wheel speed.
 
-use super::limit::within;
 use crate::Real;
 use crate::delayed_feedback::table::{DITHERED, POINTS, UNDITHERED};
 use crate::delayed_feedback::{DelayedFeedback, LINE_LEN, Law, OrbitSchedule, spacing_ticks};
 use crate::dither::Waveform;
+use crate::limit::within;
 use crate::scenario::Scenario;
 use crate::signal::Measurement;
 
@@ -22,7 +22,7 @@ pub(super) struct OrbitFeedback<T: Real> {
     is_on: bool,
     volts_per_nm: T,
     /// Greatest magnitude of both shares of the voltage together, V.
-    most_v: T,
+    limit_v: T,
     /// Greatest change in a control tick, V.
     step_v: T,
     voltage_v: T,
@@ -36,7 +36,7 @@ impl<T: Real> PartialEq for OrbitFeedback<T> {
         let numbers = self.rate_hz.differing_bits(other.rate_hz)
             | self.hysteresis_rpm.differing_bits(other.hysteresis_rpm)
             | self.volts_per_nm.differing_bits(other.volts_per_nm)
-            | self.most_v.differing_bits(other.most_v)
+            | self.limit_v.differing_bits(other.limit_v)
             | self.step_v.differing_bits(other.step_v)
             | self.voltage_v.differing_bits(other.voltage_v);
         let counts = (self.ticks_to_start ^ other.ticks_to_start)
@@ -67,7 +67,7 @@ impl<T: Real> OrbitFeedback<T> {
             ticks_to_start,
             is_on: false,
             volts_per_nm,
-            most_v: policy.motor_current_a * scenario.servo.winding_resistance_ohm,
+            limit_v: policy.motor_current_a * scenario.servo.winding_resistance_ohm,
             step_v: policy.feedback_slew_nm_per_s * volts_per_nm / rate_hz,
             voltage_v: T::zero(),
         }
@@ -99,9 +99,9 @@ impl<T: Real> OrbitFeedback<T> {
                 T::zero()
             }
         };
-        let wanted_v = within(wanted_v, (-self.most_v - motor_v, self.most_v - motor_v));
-        let (least_v, most_v) = (self.voltage_v - self.step_v, self.voltage_v + self.step_v);
-        self.voltage_v = within(wanted_v, (least_v, most_v));
+        let wanted_v = within(wanted_v, (-self.limit_v - motor_v, self.limit_v - motor_v));
+        let reach_v = (self.voltage_v - self.step_v, self.voltage_v + self.step_v);
+        self.voltage_v = within(wanted_v, reach_v);
         self.voltage_v
     }
 

@@ -2,6 +2,7 @@
 
 use super::line::DelayLine;
 use crate::Real;
+use crate::limit::within;
 
 /// The law of a delayed feedback.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,7 +12,8 @@ pub struct Law<T> {
     /// Greatest torque either way, N m.
     pub limit_nm: T,
     /// Rate at which the delay follows the slope of the squared difference, ticks per square of the signal's
-    /// unit; 0 for a delay that stays. A delay that is wrong by some ticks then becomes the period.
+    /// unit, while the torque is less than a quarter of the limit; 0 for a constant delay. A delay that is wrong by
+    /// some ticks then becomes the period.
     pub adaptation: T,
 }
 
@@ -106,13 +108,7 @@ impl<T: Real, const N: usize> DelayedFeedback<T, N> {
         }
         self.line
             .push((T::one() - law.memory) * signal + law.memory * delayed.value);
-        if torque_nm > law.limit_nm {
-            law.limit_nm
-        } else if torque_nm < -law.limit_nm {
-            -law.limit_nm
-        } else {
-            torque_nm
-        }
+        within(torque_nm, (-law.limit_nm, law.limit_nm))
     }
 }
 

@@ -100,16 +100,6 @@ impl<T: Real, const POINTS: usize> OrbitSchedule<T, POINTS> {
         }
         Ok(())
     }
-
-    /// The same schedule in another arithmetic.
-    pub fn map<U>(&self, f: &impl Fn(T) -> U) -> OrbitSchedule<U, POINTS> {
-        OrbitSchedule {
-            first_rpm: f(self.first_rpm),
-            step_rpm: f(self.step_rpm),
-            periods_s: self.periods_s.map(f),
-            gains: self.gains.map(f),
-        }
-    }
 }
 
 /// Why a schedule is refused.

@@ -9,8 +9,8 @@ use anyhow::{bail, ensure};
 use dynamics::component::Component;
 use dynamics::config::validate;
 use dynamics::delayed_feedback::{
-    Cell, Conditions, Feedback, Held, LONGEST_TICKS, Plan, Point, chart, over_speed, region,
-    region_chart,
+    Cell, CellRow, Conditions, Feedback, Held, LONGEST_TICKS, Plan, Point, PointRow, chart,
+    over_speed, region, region_chart,
 };
 use dynamics::sweep::{Parameter, SweepError, Values, scenarios};
 use dynamics::words::Short;
@@ -109,7 +109,8 @@ pub struct Arguments {
     /// Error of the delay in the simulation, s [default: 0; with --region the greatest, 0.02]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     delay_error: Option<f64>,
-    /// Rate at which the delay adapts to the orbit's period, ticks per square of the signal's unit
+    /// Rate at which the delay adapts to the orbit's period while the torque is less than a quarter of
+    /// --limit, ticks per square of the signal's unit
     #[arg(
         long,
         value_name = "RATE",
@@ -137,7 +138,10 @@ pub struct Arguments {
     #[arg(
         long,
         value_name = "FILE",
-        conflicts_with_all = ["region", "plant", "memory", "signal", "out", "json", "figure"]
+        conflicts_with_all = [
+            "region", "plant", "memory", "signal", "limit", "delay_error", "adaptation", "noise",
+            "free", "time", "out", "json", "figure",
+        ]
     )]
     table: Option<PathBuf>,
     /// At each speed, simulate all gains and 21 errors of the delay, up to --delay-error either way
@@ -197,81 +201,6 @@ struct RegionResults<'a> {
     memory: f64,
     limit_nm: f64,
     cells: &'a [Cell],
-}
-
-/// A row of the CSV of a region.
-#[derive(Serialize)]
-struct CellRow {
-    wheel_speed_rpm: f64,
-    gain: f64,
-    delay_error_s: f64,
-    multiplier: f64,
-    maxima: Option<usize>,
-    torque_rms_nm: f64,
-    torque_peak_nm: f64,
-    capture_s: Option<f64>,
-}
-
-impl From<&Cell> for CellRow {
-    fn from(cell: &Cell) -> Self {
-        Self {
-            wheel_speed_rpm: cell.wheel_speed_rpm,
-            gain: cell.gain,
-            delay_error_s: cell.delay_error_s,
-            multiplier: cell.multiplier,
-            maxima: cell.held.maxima,
-            torque_rms_nm: cell.held.torque_rms_nm,
-            torque_peak_nm: cell.held.torque_peak_nm,
-            capture_s: cell.held.capture_s,
-        }
-    }
-}
-
-/// A row of the CSV.
-#[derive(Serialize)]
-struct Row {
-    wheel_speed_rpm: f64,
-    period_s: f64,
-    free_multiplier: f64,
-    gain: f64,
-    multiplier: f64,
-    least_holding_gain: Option<f64>,
-    greatest_holding_gain: Option<f64>,
-    maxima: Option<usize>,
-    torque_rms_nm: f64,
-    torque_peak_nm: f64,
-    capture_s: Option<f64>,
-    impulse_torque_rms_nm: f64,
-    impulse_torque_peak_nm: f64,
-    impulse_capture_s: Option<f64>,
-    diverges_at_s: Option<f64>,
-    yaw_rate_min_rad_per_s: Option<f64>,
-    yaw_rate_max_rad_per_s: Option<f64>,
-}
-
-impl From<&Point> for Row {
-    fn from(point: &Point) -> Self {
-        let (best, held) = (&point.best, &point.held);
-        Self {
-            wheel_speed_rpm: point.wheel_speed_rpm,
-            period_s: point.period_s,
-            free_multiplier: point.free_multiplier,
-            gain: best.gain,
-            multiplier: best.multiplier,
-            least_holding_gain: best.holding.map(|range| range.0),
-            greatest_holding_gain: best.holding.map(|range| range.1),
-            maxima: held.maxima,
-            torque_rms_nm: held.torque_rms_nm,
-            torque_peak_nm: held.torque_peak_nm,
-            capture_s: held.capture_s,
-            impulse_torque_rms_nm: point.under_impulses.torque_rms_nm,
-            impulse_torque_peak_nm: point.under_impulses.torque_peak_nm,
-            impulse_capture_s: point.under_impulses.capture_s,
-            diverges_at_s: held.diverges_at_s,
-            yaw_rate_min_rad_per_s: held.yaw_rates_rad_per_s.map(|range| range.0),
-            yaw_rate_max_rad_per_s: held.yaw_rates_rad_per_s.map(|range| range.1),
-        }
-    }
 }
 
 impl Arguments {
@@ -416,7 +345,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     };
     arguments
         .destinations
-        .write(points.iter().map(Row::from), &results, || {
+        .write(points.iter().map(PointRow::from), &results, || {
             chart(&points).svg()
         })?;
     show(&points);

@@ -1,75 +1,23 @@
 //! Beyond the paper: a suppression that the motor can produce, beside the dither that it cannot.
 
+use super::characteristics::{SINE_V, SQUARE_V};
+use super::figures::name_of;
 use super::job::Quality;
 use super::material::{Drawing, Made, Material, Named, csv_of};
 use dynamics::component::Component;
 use dynamics::delayed_feedback::{
-    Cell, Conditions, Feedback, Plan, Point, chart, over_speed, region, region_chart,
+    Cell, CellRow, Conditions, Feedback, Plan, Point, PointRow, chart, over_speed, region,
+    region_chart,
 };
 use dynamics::realisability::{Amplitudes, demands};
-use dynamics::sweep::{Parameter, RunControl, Values, scenarios};
-use serde::Serialize;
+use dynamics::sweep::{Parameter, RunControl, SweepError, Values, scenarios};
 use shared_model::Scenario;
-use shared_model::dither::Waveform;
 
-/// Amplitudes of the paper's dither, V.
-const SQUARE_V: f64 = 0.1;
-const SINE_V: f64 = 1.0;
 /// Greatest torque of the feedback, N m: half of the motor's.
 const LIMIT_NM: f64 = 8.0;
 /// Greatest error of the delay in the region, s, and speeds of the regions, rpm.
 const ERROR_S: f64 = 0.02;
 const REGION_SPEEDS_RPM: (f64, f64, f64) = (1700.0, 1900.0, 100.0);
-
-/// A row of the data.
-#[derive(Serialize)]
-struct Row {
-    wheel_speed_rpm: f64,
-    period_s: f64,
-    free_multiplier: f64,
-    gain: f64,
-    multiplier: f64,
-    torque_rms_nm: f64,
-    capture_s: Option<f64>,
-}
-
-impl From<&Point> for Row {
-    fn from(point: &Point) -> Self {
-        Self {
-            wheel_speed_rpm: point.wheel_speed_rpm,
-            period_s: point.period_s,
-            free_multiplier: point.free_multiplier,
-            gain: point.best.gain,
-            multiplier: point.best.multiplier,
-            torque_rms_nm: point.held.torque_rms_nm,
-            capture_s: point.held.capture_s,
-        }
-    }
-}
-
-/// A row of the data of the regions.
-#[derive(Serialize)]
-struct CellRow {
-    wheel_speed_rpm: f64,
-    gain: f64,
-    delay_error_s: f64,
-    multiplier: f64,
-    maxima: Option<usize>,
-    torque_rms_nm: f64,
-}
-
-impl From<&Cell> for CellRow {
-    fn from(cell: &Cell) -> Self {
-        Self {
-            wheel_speed_rpm: cell.wheel_speed_rpm,
-            gain: cell.gain,
-            delay_error_s: cell.delay_error_s,
-            multiplier: cell.multiplier,
-            maxima: cell.held.maxima,
-            torque_rms_nm: cell.held.torque_rms_nm,
-        }
-    }
-}
 
 /// Steps of speeds and gains, number of errors, and length of the simulations.
 struct Grid {
@@ -134,7 +82,7 @@ pub fn beyond(named: &Named, quality: Quality, watch: RunControl) -> Made {
         material.findings.push(("Delayed feedback".into(), says));
         return Ok(material);
     }
-    let rows: Vec<Row> = points.iter().map(Row::from).collect();
+    let rows: Vec<PointRow> = points.iter().map(PointRow::from).collect();
     material.drawings.push(Drawing {
         name: format!("feedback-{}", named.name),
         caption: format!(
@@ -162,7 +110,7 @@ fn regions(
     scenario: &Scenario<f64>,
     grid: &Grid,
     watch: RunControl,
-) -> Result<Vec<Cell>, dynamics::sweep::SweepError> {
+) -> Result<Vec<Cell>, SweepError> {
     let (from, to, step) = REGION_SPEEDS_RPM;
     let speeds = Values::new(Parameter::Speed.name(), from, to, step)?;
     let errors = Values::between("error of the delay (s)", -ERROR_S, ERROR_S, grid.errors)?;
@@ -176,14 +124,10 @@ fn regions(
 fn comparison(scenario: &Scenario<f64>, points: &[Point]) -> Vec<(String, String)> {
     let amplitudes = Amplitudes::from_volts(scenario, SQUARE_V, SINE_V);
     let dithers = demands(scenario, &amplitudes).map(|demand| {
-        let name = match demand.waveform {
-            Waveform::Sine => "sine, 1.0 V",
-            Waveform::Square | Waveform::None => "square wave, 0.1 V",
-        };
         let (needed_nm, motor_nm) = (demand.inertia_torque_nm, demand.motor_torque_nm);
         let can = if needed_nm <= motor_nm { "yes" } else { "no" };
         (
-            format!("Dither ({name})"),
+            format!("The {} dither", name_of(demand.waveform)),
             format!("realisable by the actuator of Table 2: {can}; it needs {needed_nm:.2e} N m where the motor has {motor_nm:.1} N m"),
         )
     });

@@ -12,8 +12,8 @@ use shared_model::dither::Waveform;
 /// Greatest slip angle of the figures, rad.
 const GREATEST_RAD: f64 = 0.3;
 /// The paper's amplitudes, V.
-const SQUARE_V: f64 = 0.1;
-const SINE_V: f64 = 1.0;
+pub const SQUARE_V: f64 = 0.1;
+pub const SINE_V: f64 = 1.0;
 
 /// The figures, drawn from closed forms.
 pub fn characteristics(named: &Named, _quality: Quality, watch: RunControl) -> Made {

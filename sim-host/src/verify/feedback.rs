@@ -4,6 +4,7 @@ use dynamics::component::Component;
 use dynamics::delayed_feedback::{Feedback, Linearised};
 use pil::closed_loop::{self, Run};
 use pil::ecu::Software;
+use pil::feedback::{change_over_period, root_mean_square, torques_nm};
 use pil::manoeuvre::Manoeuvre;
 use pil::mil_sil_pil::LoopError;
 use pil::vehicle_node::{VehicleNode, ecu_scenario};
@@ -45,20 +46,11 @@ pub(super) fn checks(
         .len()
         .saturating_sub((JUDGED_S * rate_hz) as usize);
     let judged = &run.records[last..];
-    let yaw_rates: Vec<f64> = judged
-        .iter()
-        .map(|record| record.yaw_rate_rad_per_s)
-        .collect();
-    let changes = yaw_rates.iter().zip(yaw_rates.iter().skip(period_ticks));
-    let change = root_mean_square(changes.map(|(a, b)| b - a));
-    let low = yaw_rates.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = yaw_rates.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let nm_per_a = scenario.servo.winding_resistance_ohm / scenario.motor_v_per_nm();
-    let torque_nm = root_mean_square(
-        judged
-            .iter()
-            .map(|record| nm_per_a * (record.motor_current_a - record.current_request_a)),
-    );
+    let change = change_over_period(judged, period_ticks);
+    let yaw_rates = || judged.iter().map(|record| record.yaw_rate_rad_per_s);
+    let low = yaw_rates().fold(f64::INFINITY, f64::min);
+    let high = yaw_rates().fold(f64::NEG_INFINITY, f64::max);
+    let torque_nm = root_mean_square(torques_nm(judged, scenario));
     let count_nm = 2.0 * scenario.servo.bus_voltage_v
         / f64::from(scenario.servo.period_counts(scenario.run.pwm_rate_hz))
         / scenario.motor_v_per_nm();
@@ -88,13 +80,6 @@ pub(super) fn checks(
         )),
         exponent(id, scenario, f64::from(tuning.gain)),
     ])
-}
-
-fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0_u32), |(sum, count), value| {
-        (sum + value * value, count + 1)
-    });
-    (sum / f64::from(count.max(1))).sqrt()
 }
 
 /// Up to the feedback's start the run is that without it.

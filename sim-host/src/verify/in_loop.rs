@@ -21,13 +21,6 @@ const DITHERED_S: f64 = 10.0;
 /// Long enough for the delayed feedback, which sets in at 3 s, to capture the orbit.
 const FEEDBACK_S: f64 = 40.0;
 
-/// What suppresses the chaos of a manoeuvre.
-#[derive(Clone, Copy)]
-enum By {
-    Dither(Waveform),
-    Feedback,
-}
-
 /// The manoeuvres, driven, with the checks over them.
 pub(super) fn run(
     options: &Options,
@@ -35,12 +28,12 @@ pub(super) fn run(
 ) -> Result<(Vec<Check>, Vec<DriveReport>), VerifyError> {
     // The longest first.
     let driven: Vec<(Vec<Check>, DriveReport)> = [
-        By::Feedback,
-        By::Dither(Waveform::Square),
-        By::Dither(Waveform::Sine),
+        (Suppression::DelayedFeedback, Waveform::None),
+        (Suppression::Dither, Waveform::Square),
+        (Suppression::Dither, Waveform::Sine),
     ]
     .into_par_iter()
-    .map(|by| one(by, options, on_progress))
+    .map(|of| one(of, options, on_progress))
     .collect::<Result<_, _>>()?;
     let (checks, mut reports): (Vec<_>, Vec<_>) = driven.into_iter().unzip();
     reports.rotate_left(1);
@@ -48,7 +41,7 @@ pub(super) fn run(
 }
 
 fn one(
-    by: By,
+    (suppression, waveform): (Suppression, Waveform),
     options: &Options,
     on_progress: &(impl Fn(Progress) + Sync),
 ) -> Result<(Vec<Check>, DriveReport), VerifyError> {
@@ -56,22 +49,18 @@ fn one(
     let base = &options.base;
     let rpm = base.run.wheel_speed_rpm;
     let mut manoeuvre = Manoeuvre::constant(rpm, base.steering.motor_current_a);
-    let (name, what) = match by {
-        By::Dither(Waveform::Sine) => ("sine", "sine dither as scheduled"),
-        By::Dither(Waveform::Square | Waveform::None) => ("square", "square dither as scheduled"),
-        By::Feedback => ("feedback", "delayed feedback"),
+    let (name, what) = match waveform {
+        Waveform::None => ("feedback", "delayed feedback"),
+        Waveform::Square => ("square", "square dither as scheduled"),
+        Waveform::Sine => ("sine", "sine dither as scheduled"),
     };
-    match by {
-        By::Dither(waveform) => {
-            scenario.dither.waveform = waveform;
-            scenario.controller.suppression = Suppression::Dither;
-            scenario.run.duration_s = DITHERED_S;
-        }
-        By::Feedback => {
-            scenario.controller.suppression = Suppression::DelayedFeedback;
-            scenario.run.duration_s = FEEDBACK_S;
-        }
-    }
+    scenario.dither.waveform = waveform;
+    scenario.controller.suppression = suppression;
+    scenario.run.duration_s = if suppression.has_feedback() {
+        FEEDBACK_S
+    } else {
+        DITHERED_S
+    };
     manoeuvre.name = format!("in the loop, {rpm} rpm, {what}");
     let target = Target {
         image: options.image.clone(),
@@ -93,7 +82,7 @@ fn one(
     let instructions = Instructions::in_loop(&levels.processor.costs, &scenario, target.machine);
     let mut checks = checks(&id, &levels);
     checks.push(load(format!("load/{id}"), &instructions));
-    if matches!(by, By::Feedback) {
+    if suppression.has_feedback() {
         let run = &levels.processor.run;
         checks.extend(feedback::checks(&id, &scenario, &manoeuvre, run).map_err(failed)?);
     }

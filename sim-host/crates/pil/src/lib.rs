@@ -6,6 +6,7 @@ pub mod disturbance;
 pub mod ecu;
 pub mod equivalence;
 pub mod fault;
+pub mod feedback;
 pub mod figure;
 pub mod instructions;
 pub mod manoeuvre;

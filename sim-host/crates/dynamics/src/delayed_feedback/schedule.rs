@@ -42,7 +42,9 @@ pub fn entries(
     gains: &Values,
     control: RunControl,
 ) -> Result<Vec<[Option<Entry>; 2]>, SweepError> {
-    let undithered = scenarios(scenario, Parameter::Speed, speeds_rpm)?;
+    let mut undithered = *scenario;
+    undithered.dither.waveform = Waveform::None;
+    let undithered = scenarios(&undithered, Parameter::Speed, speeds_rpm)?;
     let dithered: Vec<_> = undithered.iter().map(under_square).collect();
     let [branch, other_branch] = [&undithered, &dithered]
         .map(|of| interrupt::catch(|| branch_over_speed(of)).unwrap_or_default());

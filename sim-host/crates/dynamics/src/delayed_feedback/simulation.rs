@@ -40,8 +40,8 @@ pub struct Held {
     pub yaw_rates_rad_per_s: Option<(f64, f64)>,
 }
 
-/// The trajectory of a vehicle under the scenario's averaged dither, the feedback being computed at the control rate and switched on after
-/// a while. The torque is held over a control tick.
+/// The trajectory of a vehicle under its averaged dither. The feedback is computed at the control rate and
+/// switched on after a while; its torque is held over a control tick.
 pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditions) -> Held {
     let tick_s = 1.0 / plant.run.control_rate_hz;
     let spacing = spacing_ticks(plant.run.control_rate_hz as u32);

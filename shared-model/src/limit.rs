@@ -3,7 +3,7 @@
 use crate::Real;
 
 /// `value`, or the nearer end of the range if it is outside.
-pub(super) fn within<T: Real>(value: T, (least, most): (T, T)) -> T {
+pub(crate) fn within<T: Real>(value: T, (least, most): (T, T)) -> T {
     if value > most {
         most
     } else if value < least {
