@@ -128,3 +128,30 @@ impl<T: Real> OrbitFeedback<T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_are_equal_if_their_numbers_are() {
+        let one = OrbitFeedback::<f32>::new(&Scenario::reconstruction(), 3);
+        assert_eq!(one, one);
+        let changes: [fn(&mut OrbitFeedback<f32>); 9] = [
+            |other| other.schedule = &DITHERED,
+            |other| other.rate_hz += 1.0,
+            |other| other.hysteresis_rpm += 1.0,
+            |other| other.ticks_to_start += 1,
+            |other| other.is_on = true,
+            |other| other.volts_per_nm += 1.0,
+            |other| other.limit_v += 1.0,
+            |other| other.step_v += 1.0,
+            |other| other.voltage_v = -0.0,
+        ];
+        for (place, change) in changes.into_iter().enumerate() {
+            let mut other = one;
+            change(&mut other);
+            assert_ne!(one, other, "{place}");
+        }
+    }
+}

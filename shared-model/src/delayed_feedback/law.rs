@@ -150,6 +150,49 @@ mod tests {
         assert_eq!(feedback.adapted_ticks(), 0.0);
     }
 
+    /// While the torque is a quarter of its limit or more the delay stays.
+    #[test]
+    fn the_delay_does_not_adapt_far_from_an_orbit() {
+        let adapted = |limit_nm: f64| {
+            let law = Law {
+                adaptation: 0.05,
+                limit_nm,
+                ..LAW
+            };
+            let mut feedback = DelayedFeedback::<f64, 8>::new(law, 1);
+            for k in 0..8 {
+                feedback.run(f64::from(k), 1.0, 4.0);
+            }
+            feedback.adapted_ticks()
+        };
+        // The difference is -4 at each tick from the fifth on: a delay of no ticks would have none.
+        assert_eq!(adapted(16.0), 0.0);
+        assert!(adapted(16.1) < 0.0);
+    }
+
+    #[test]
+    fn two_are_equal_if_their_numbers_are() {
+        let one = DelayedFeedback::<f64, 8>::new(LAW, 1);
+        let mut other = one;
+        other.observe(1.0);
+        assert_eq!(one, other);
+        other.adapted_ticks = -0.0;
+        assert_ne!(one, other);
+        for law in [
+            Law { memory: 0.1, ..LAW },
+            Law {
+                limit_nm: 0.1,
+                ..LAW
+            },
+            Law {
+                adaptation: 0.1,
+                ..LAW
+            },
+        ] {
+            assert_ne!(one, DelayedFeedback::new(law, 1));
+        }
+    }
+
     /// s(t) = (1 - R) (y(t) + R y(t - T) + R^2 y(t - 2 T) ...).
     #[test]
     fn memory_weighs_past_periods() {
