@@ -427,10 +427,10 @@ fn captured(held: &Held) -> String {
 
 fn show(points: &[Point]) {
     say!(
-        "speed  period    multiplier      gain   gains that hold  torque (N m)      maxima  captured  impulses"
+        "speed  period    multiplier      gain   gains that hold  torque (N m)      maxima  captured  impulses  rest"
     );
     say!(
-        "rpm    s         free     held            from    to      rms      peak             after s   after s"
+        "rpm    s         free     held            from    to      rms      peak             after s   after s   after s"
     );
     for point in points {
         let (best, held) = (&point.best, &point.held);
@@ -440,7 +440,7 @@ fn show(points: &[Point]) {
                 (format!("{low}"), format!("{high}"))
             });
         say!(
-            "{:<6} {:.6}  {:<8.3} {:<6.3} {:>6}   {low:<7} {high:<7} {:<8.4} {:<8.4} {:<7} {:<9} {}",
+            "{:<6} {:.6}  {:<8.3} {:<6.3} {:>6}   {low:<7} {high:<7} {:<8.4} {:<8.4} {:<7} {:<9} {:<9} {}",
             point.wheel_speed_rpm,
             point.period_s,
             point.free_multiplier,
@@ -451,7 +451,8 @@ fn show(points: &[Point]) {
             held.maxima
                 .map_or("none".into(), |maxima| maxima.to_string()),
             captured(held),
-            captured(&point.under_impulses)
+            captured(&point.under_impulses),
+            captured(&point.to_rest)
         );
     }
 }

@@ -17,6 +17,7 @@ mod region;
 mod rows;
 mod schedule;
 mod simulation;
+mod to_rest;
 mod vehicle;
 
 pub use feedback::{Conditions, Feedback, LONGEST_TICKS, Plan};

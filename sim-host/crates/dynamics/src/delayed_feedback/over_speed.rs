@@ -5,6 +5,7 @@ use super::impulse;
 use super::linearised::{Best, Linearised};
 use super::orbit::{branch_over_speed, orbit_on};
 use super::simulation::{Held, simulate};
+use super::to_rest;
 use crate::sweep::{Parameter, RunControl, SweepError, Values, scenarios};
 use shared_model::Scenario;
 
@@ -23,6 +24,8 @@ pub struct Point {
     pub held: Held,
     /// The same under an impulse per cycle by the exact state, without noise and latency.
     pub under_impulses: Held,
+    /// The same under feedback of the exact state to an equilibrium, without noise; captured is one that comes to rest.
+    pub to_rest: Held,
 }
 
 /// Orbits, best gains and simulations over the wheel speed, each with the orbit's own period as delay. `plant` is
@@ -67,6 +70,7 @@ pub fn over_speed(
                 plan.feedback.limit_nm,
                 &plan.conditions,
             ),
+            to_rest: to_rest::simulate(scenario, plan, &plant(scenario)),
         })
     });
     Ok(points.into_iter().flatten().collect())
