@@ -9,7 +9,7 @@ use anyhow::{bail, ensure};
 use dynamics::component::Component;
 use dynamics::config::validate;
 use dynamics::delayed_feedback::{
-    Cell, CellRow, Conditions, Feedback, Held, LONGEST_TICKS, Plan, Point, PointRow, chart,
+    Cell, CellRow, Conditions, Feedback, Held, LONGEST_TICKS, Mixed, Plan, Point, PointRow, chart,
     over_speed, region, region_chart,
 };
 use dynamics::sweep::{Parameter, SweepError, Values, scenarios};
@@ -66,6 +66,9 @@ pub struct Arguments {
     /// Signal that is fed back
     #[arg(long, value_name = "COMPONENT", default_value = "yaw_rate")]
     signal: Component,
+    /// Signal that is added to it with a weight, as in steering_rate=-0.5
+    #[arg(long, value_name = "COMPONENT=WEIGHT", allow_hyphen_values = true)]
+    mix: Option<Mixed>,
     /// Least gain tried, N m s/rad for rates, N m/rad for angles
     #[arg(
         long,
@@ -139,7 +142,7 @@ pub struct Arguments {
         long,
         value_name = "FILE",
         conflicts_with_all = [
-            "region", "plant", "memory", "signal", "limit", "delay_error", "adaptation", "noise",
+            "region", "plant", "memory", "signal", "mix", "limit", "delay_error", "adaptation", "noise",
             "free", "time", "out", "json", "figure",
         ]
     )]
@@ -189,6 +192,7 @@ const NOISE: std::ops::RangeInclusive<f64> = 0.0..=10.0;
 #[derive(Serialize)]
 struct Results<'a> {
     signal: Component,
+    mixed: Option<Mixed>,
     memory: f64,
     limit_nm: f64,
     delay_error_s: f64,
@@ -198,6 +202,7 @@ struct Results<'a> {
 #[derive(Serialize)]
 struct RegionResults<'a> {
     signal: Component,
+    mixed: Option<Mixed>,
     memory: f64,
     limit_nm: f64,
     cells: &'a [Cell],
@@ -243,6 +248,7 @@ impl Arguments {
         Ok(Plan {
             feedback: Feedback {
                 component: self.signal,
+                mixed: self.mix,
                 // Both are chosen at each speed.
                 gain: 0.0,
                 delay_s: 0.0,
@@ -338,6 +344,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     let results = Results {
         signal: arguments.signal,
+        mixed: arguments.mix,
         memory: arguments.memory,
         limit_nm: arguments.limit,
         delay_error_s: plan.delay_error_s,
@@ -395,6 +402,7 @@ fn over_delay(
     }
     let results = RegionResults {
         signal: arguments.signal,
+        mixed: arguments.mix,
         memory: arguments.memory,
         limit_nm: arguments.limit,
         cells: &cells,

@@ -50,6 +50,7 @@ fn plan(gains: Values, time_s: f64) -> Plan {
     Plan {
         feedback: Feedback {
             component: Component::YAW_RATE,
+            mixed: None,
             // Both are chosen at each speed.
             gain: 0.0,
             delay_s: 0.0,

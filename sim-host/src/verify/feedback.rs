@@ -118,6 +118,7 @@ fn exponent(id: &str, scenario: &Scenario<f64>, gain: f64) -> Check {
     };
     let multiplier = orbit.greatest_multiplier(&Feedback {
         component: Component::YAW_RATE,
+        mixed: None,
         gain,
         delay_s: orbit.period_s,
         memory: 0.0,

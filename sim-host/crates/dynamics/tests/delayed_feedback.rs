@@ -1,7 +1,10 @@
 //! Delayed feedback: multipliers by power iteration against continuation and simulation.
 
 use dynamics::component::Component;
-use dynamics::delayed_feedback::{Conditions, Feedback, Linearised, simulate};
+use dynamics::delayed_feedback::{
+    Conditions, Feedback, Linearised, Mixed, Plan, over_speed, simulate,
+};
+use dynamics::sweep::{RunControl, Values};
 use shared_model::Scenario;
 
 const CONDITIONS: Conditions = Conditions {
@@ -20,6 +23,7 @@ fn at(rpm: f64) -> (Scenario<f64>, Linearised) {
 fn feedback(orbit: &Linearised, gain: f64) -> Feedback {
     Feedback {
         component: Component::YAW_RATE,
+        mixed: None,
         gain,
         delay_s: orbit.period_s,
         memory: 0.0,
@@ -131,5 +135,71 @@ fn the_limit_is_kept() {
             limit_nm == 0.0 || held.torque_peak_nm == limit_nm,
             "{held:?}"
         );
+    }
+}
+
+/// A mix of signals is their weighted sum: the same gain in other shares gives the same multiplier.
+#[test]
+fn a_mix_of_signals_is_their_weighted_sum() {
+    let (_, orbit) = at(1750.0);
+    let mixed = |component, other, weight| Feedback {
+        component,
+        mixed: Some(Mixed {
+            component: other,
+            weight,
+        }),
+        ..feedback(&orbit, 0.0)
+    };
+    let [yaw, steering] = [Component::YAW_RATE, Component::STEERING_RATE];
+    let at_gain = |gain, feedback| orbit.greatest_multiplier(&Feedback { gain, ..feedback });
+    let one = at_gain(6.0, mixed(yaw, steering, -0.5));
+    let same = at_gain(-3.0, mixed(steering, yaw, -2.0));
+    assert!((one - same).abs() < 1e-9, "{one} {same}");
+    let alone = at_gain(6.0, feedback(&orbit, 0.0));
+    assert!((one - alone).abs() > 1e-3, "{one} {alone}");
+    let without = at_gain(6.0, mixed(yaw, steering, 0.0));
+    assert_eq!(without, alone);
+}
+
+/// The whole state leads the chaos to rest with a limited torque, and no torque does not.
+#[test]
+fn feedback_of_the_whole_state_leads_to_rest() {
+    let scenario = Scenario::reconstruction();
+    let speeds = Values::new("wheel speed (rpm)", 1700.0, 1950.0, 125.0).unwrap();
+    let at_limit = |limit_nm| {
+        let mut plan = Plan {
+            feedback: Feedback {
+                component: Component::YAW_RATE,
+                mixed: None,
+                gain: 0.0,
+                delay_s: 0.0,
+                memory: 0.0,
+                limit_nm,
+                adaptation: 0.0,
+                latency_ticks: 0,
+            },
+            gains: Values::new("gain", 4.0, 4.0, 1.0).unwrap(),
+            delay_error_s: 0.0,
+            conditions: CONDITIONS,
+        };
+        plan.conditions.time_s = 150.0;
+        let control = RunControl::none();
+        over_speed(&scenario, &speeds, &plan, &scenario, control).unwrap()
+    };
+    for (limit_nm, wanted) in [
+        (0.0, [false, false, false]),
+        (8.0, [true, true, false]),
+        (16.0, [true, true, true]),
+    ] {
+        let points = at_limit(limit_nm).into_iter().map(|point| point.unwrap());
+        for (point, at_rest) in points.zip(wanted) {
+            let (rpm, held) = (point.wheel_speed_rpm, point.to_rest);
+            let (low, high) = held.yaw_rates_rad_per_s.unwrap();
+            assert_eq!(held.capture_s.is_some(), at_rest, "{rpm}: {held:?}");
+            assert_eq!(high - low < 1e-3, at_rest, "{rpm}: {held:?}");
+            assert!(held.torque_peak_nm <= limit_nm, "{rpm}: {held:?}");
+            // Friction holds the steering.
+            assert!(!at_rest || held.torque_rms_nm < 0.5, "{rpm}: {held:?}");
+        }
     }
 }

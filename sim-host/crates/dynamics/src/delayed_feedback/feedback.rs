@@ -1,19 +1,26 @@
 //! The inputs: a feedback, and what is computed of it.
 
-use crate::component::Component;
+use crate::component::{Component, UnknownComponent};
 use crate::sweep::Values;
+use nalgebra::Vector4;
 use shared_model::delayed_feedback::Law;
+use std::str::FromStr;
 
 /// Values of the delay line: 8 s and more, with the spacing of the ECU's.
 pub(super) const LINE_VALUES: usize = 412;
 /// Longest delay that is analysed, ticks: 8 s at a control rate of 1 kHz.
 pub const LONGEST_TICKS: usize = 8192;
 
+/// Greatest weight of a second signal.
+const GREATEST_WEIGHT: f64 = 1e6;
+
 /// A feedback: which signal, how strong, how late.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Feedback {
     /// The signal that is fed back.
     pub component: Component,
+    /// What is added to it.
+    pub mixed: Option<Mixed>,
     /// Torque per difference of the signal, N m s/rad for rates and N m/rad for angles.
     pub gain: f64,
     /// Delay, s; without torque if it has more ticks than the line.
@@ -29,7 +36,43 @@ pub struct Feedback {
     pub latency_ticks: usize,
 }
 
+/// A second signal in a feedback.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Mixed {
+    /// The signal.
+    pub component: Component,
+    /// Its weight, in units of the first signal per its own.
+    pub weight: f64,
+}
+
+impl FromStr for Mixed {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let form = || format!("{text:?}: must be COMPONENT=WEIGHT, as in steering_rate=-0.5");
+        let (component, weight) = text.split_once('=').ok_or_else(form)?;
+        let component = component
+            .parse()
+            .map_err(|error: UnknownComponent| error.to_string())?;
+        let weight: f64 = weight.parse().map_err(|_| form())?;
+        if weight.abs() > GREATEST_WEIGHT || weight.is_nan() {
+            return Err(format!(
+                "weight {weight}: must be from -{GREATEST_WEIGHT} to {GREATEST_WEIGHT}"
+            ));
+        }
+        Ok(Self { component, weight })
+    }
+}
+
 impl Feedback {
+    /// The signal of a state, or of a difference of states.
+    pub(super) fn signal(&self, x: &Vector4<f64>) -> f64 {
+        let mixed = self
+            .mixed
+            .map(|mixed| mixed.weight * x[mixed.component.index]);
+        x[self.component.index] + mixed.unwrap_or(0.0)
+    }
+
     pub(super) fn law(&self) -> Law<f64> {
         Law {
             memory: self.memory,

@@ -3,6 +3,7 @@
 use super::feedback::Feedback;
 use super::over_speed::Point;
 use super::region::Cell;
+use super::simulation::Held;
 use crate::sweep::Parameter;
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series, large_dots};
 
@@ -44,7 +45,12 @@ fn region_series(cells: &[Cell]) -> Vec<Series> {
     series.collect()
 }
 
-/// Multipliers without and with feedback, and the torque that is left, over the wheel speed.
+fn captures(label: &str, n: usize, of: fn(&Point) -> &Held, points: &[Point]) -> Vec<Series> {
+    let captured = |point: &Point| Some((point.wheel_speed_rpm, of(point).capture_s?));
+    large_dots(label, n, points.iter().filter_map(captured).collect())
+}
+
+/// Multipliers without and with feedback, the torque that is left, and the times of capture, over the wheel speed.
 pub fn chart(points: &[Point]) -> Chart {
     let line = |label: &str, n, of: fn(&Point) -> f64| Series {
         label: label.into(),
@@ -82,6 +88,27 @@ pub fn chart(points: &[Point]) -> Chart {
                     line("peak", 1, |point| point.held.torque_peak_nm),
                     line("root mean square", 0, |point| point.held.torque_rms_nm),
                 ],
+                Vec::new(),
+            ),
+            panel(
+                "time from switching on to capture, where captured",
+                AxisSpec::linear("time (s)"),
+                [
+                    captures("orbit, by delayed feedback", 0, |point| &point.held, points),
+                    captures(
+                        "orbit, by impulses",
+                        1,
+                        |point| &point.under_impulses,
+                        points,
+                    ),
+                    captures(
+                        "rest, by the whole state",
+                        2,
+                        |point| &point.to_rest,
+                        points,
+                    ),
+                ]
+                .concat(),
                 Vec::new(),
             ),
         ],

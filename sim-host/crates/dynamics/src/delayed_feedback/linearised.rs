@@ -81,15 +81,14 @@ impl Linearised {
     /// The greatest modulus of a multiplier beside 1 under a feedback, by power iteration: the vehicle's state
     /// and the delay line, along the orbit. To first order in a delay unlike the period.
     pub fn greatest_multiplier(&self, feedback: &Feedback) -> f64 {
-        let index = feedback.component.index;
         let mut perturbed = Perturbation::new(self, feedback);
         let mut log_growth = 0.0;
         for period in 0..SETTLING_PERIODS + MEASURED_PERIODS {
             interrupt::check();
             for tick in &self.ticks {
-                perturbed.step(tick, index, feedback);
+                perturbed.step(tick, feedback);
             }
-            perturbed.remove_shift(self, index);
+            perturbed.remove_shift(self, feedback);
             let log_size = perturbed.normalise();
             match log_size {
                 // All of it is gone: as with the dead beat of a scalar system.
@@ -206,8 +205,8 @@ impl Perturbation {
         later + (ticks - whole) * (at(whole as usize + 1) - later)
     }
 
-    fn step(&mut self, tick: &Tick, index: usize, feedback: &Feedback) {
-        let signal = self.state[index];
+    fn step(&mut self, tick: &Tick, feedback: &Feedback) {
+        let signal = feedback.signal(&self.state);
         let delayed = self.before(self.delay_ticks - 1.0);
         self.torques_nm
             .push_back(feedback.gain * (delayed - signal));
@@ -220,13 +219,13 @@ impl Perturbation {
 
     /// Takes out the shift along the orbit, whose multiplier is 1: what is left crosses the section of the
     /// orbit's start at the same time.
-    fn remove_shift(&mut self, orbit: &Linearised, index: usize) {
+    fn remove_shift(&mut self, orbit: &Linearised, feedback: &Feedback) {
         let rate = orbit.ticks[0].rate;
         let share = self.state.dot(&rate) / rate.norm_squared();
         self.state -= rate * share;
         let rates = orbit.ticks.iter().rev().cycle();
         for (value, tick) in self.line.iter_mut().rev().zip(rates) {
-            *value -= share * tick.rate[index];
+            *value -= share * feedback.signal(&tick.rate);
         }
     }
 

@@ -20,7 +20,7 @@ mod simulation;
 mod to_rest;
 mod vehicle;
 
-pub use feedback::{Conditions, Feedback, LONGEST_TICKS, Plan};
+pub use feedback::{Conditions, Feedback, LONGEST_TICKS, Mixed, Plan};
 pub use figure::{chart, region_chart};
 pub use linearised::{Best, Linearised};
 pub use over_speed::{Point, over_speed};

@@ -54,7 +54,7 @@ pub fn simulate(plant: &Scenario<f64>, feedback: &Feedback, conditions: &Conditi
             law.restart();
         }
         was_on = is_on;
-        let signal = x[feedback.component.index] + noise.next();
+        let signal = feedback.signal(x) + noise.next();
         law.run(signal, feedback.gain, feedback.delay_s / tick_s)
     };
     let delayed_by = (feedback.latency_ticks, feedback.limit_nm);
