@@ -23,7 +23,8 @@ use std::path::PathBuf;
 /// The torque K (y(t - T) - y(t)) is added to the motor's constant one at the control rate, T being the
 /// period of the orbit. At each speed the orbit is computed, the gain K with the least multiplier is
 /// chosen from those tried, and the trajectory from the scenario's initial state is simulated, the
-/// feedback being switched on after --free. The torque is about the steering axis. The dither, if there
+/// feedback being switched on after --free. Beside it: an impulse per cycle that holds the same orbit, and
+/// feedback of the whole state that leads to rest, both by the exact state. The torque is about the steering axis. The dither, if there
 /// is one, is averaged. With --table the periods and gains that the ECU carries are computed instead.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:

@@ -6,7 +6,7 @@ use super::job::Quality;
 use super::material::{Drawing, Made, Material, Named, csv_of};
 use dynamics::component::Component;
 use dynamics::delayed_feedback::{
-    Cell, CellRow, Conditions, Feedback, Plan, Point, PointRow, chart, over_speed, region,
+    Cell, CellRow, Conditions, Feedback, Held, Plan, Point, PointRow, chart, over_speed, region,
     region_chart,
 };
 use dynamics::realisability::{Amplitudes, demands};
@@ -132,23 +132,52 @@ fn comparison(scenario: &Scenario<f64>, points: &[Point]) -> Vec<(String, String
             format!("realisable by the actuator of Table 2: {can}; it needs {needed_nm:.2e} N m where the motor has {motor_nm:.1} N m"),
         )
     });
-    let held: Vec<&Point> = points
-        .iter()
-        .filter(|point| point.held.capture_s.is_some())
-        .collect();
-    let greatest =
-        |value: fn(&Point) -> f64| held.iter().map(|point| value(point)).fold(0.0, f64::max);
+    let (held, longest_s, left_nm) = captures(points, |point| &point.held);
     let feedback = (
         "Delayed feedback".to_owned(),
         format!(
             "realisable by the actuator of Table 2: yes; it holds the orbit at {} of {} speeds from 1640 to 2000 rpm, captured after \
              up to {:.0} s with at most {LIMIT_NM} N m; {:.4} N m root mean square are left. The yaw rate stays as great as in \
              chaos, where the dither makes it smaller.",
-            held.len(),
+            held,
             points.len(),
-            greatest(|point| point.held.capture_s.unwrap_or(0.0)),
-            greatest(|point| point.held.torque_rms_nm)
+            longest_s,
+            left_nm
         ),
     );
-    dithers.into_iter().chain([feedback]).collect()
+    dithers
+        .into_iter()
+        .chain([feedback, to_rest(points)])
+        .collect()
+}
+
+fn to_rest(points: &[Point]) -> (String, String) {
+    let (at_rest, longest_s, left_nm) = captures(points, |point| &point.to_rest);
+    (
+        "Feedback of the whole state".to_owned(),
+        format!(
+            "realisable by the actuator of Table 2: yes, but there is no sensor of the sideslip angle; the vehicle comes to rest at \
+             {at_rest} of {} speeds from 1640 to 2000 rpm, after up to {longest_s:.0} s with at most {LIMIT_NM} N m; at most \
+             {left_nm:.2} N m root mean square are left, which friction holds.",
+            points.len()
+        ),
+    )
+}
+
+/// The number of captures, the longest time to one, s, and the greatest torque that is left, N m.
+fn captures(points: &[Point], of: fn(&Point) -> &Held) -> (usize, f64, f64) {
+    let captured = points
+        .iter()
+        .map(of)
+        .filter_map(|held| Some((held.capture_s?, held)));
+    captured.fold(
+        (0, 0.0, 0.0),
+        |(count, longest_s, left_nm), (capture_s, held)| {
+            (
+                count + 1,
+                capture_s.max(longest_s),
+                held.torque_rms_nm.max(left_nm),
+            )
+        },
+    )
 }
