@@ -343,6 +343,28 @@ fn the_gate_bounds_the_feedback() {
     }
 }
 
+/// A change by the limit itself passes, and the next number above it does not.
+#[test]
+fn the_gate_passes_the_fastest_change() {
+    let scenario = scenario();
+    let period_s = 1.0 / scenario.run.control_rate_hz;
+    let limits = &scenario.gate;
+    let most_v = limits.feedback_slew_v_per_s * period_s + 1e-6 * limits.feedback_voltage_v;
+    for (feedback_v, faults) in [
+        (most_v, Faults::NONE),
+        (most_v.next_up(), Fault::FeedbackSlew.into()),
+    ] {
+        let mut supervisor = gate_at(&scenario, 0.0, 0.0);
+        let command = Command {
+            motor_v: 0.0,
+            feedback_v,
+            dither_amplitude_v: 0.0,
+        };
+        supervisor.run(&observed(&command, at(1750.0, 0.5, 0.0)));
+        assert_eq!(supervisor.faults(), faults, "{feedback_v}");
+    }
+}
+
 /// Where the feedback is not chosen, any is too much.
 #[test]
 fn the_gate_passes_no_feedback_that_is_not_chosen() {
@@ -459,6 +481,12 @@ fn inconsistent_settings_are_refused() {
         scenario.apply(setting).unwrap();
         assert!(Ecu::new(&scenario, CLOCK_HZ).is_ok(), "{setting}");
     }
+    // What the gate just passes may be the limit.
+    let mut exact = scenario();
+    exact.gate.feedback_voltage_v = exact.controller.feedback_torque_nm * exact.motor_v_per_nm();
+    exact.gate.feedback_slew_v_per_s =
+        exact.controller.feedback_slew_nm_per_s * exact.motor_v_per_nm();
+    assert!(Ecu::new(&exact, CLOCK_HZ).is_ok());
     let mut scenario = scenario();
     assert!(scenario.apply("controller.suppression=all").is_err());
     scenario.apply("controller.suppression=both").unwrap();

@@ -744,3 +744,18 @@ proptest! {
         prop_assert_eq!(last, Setpoint::neutral());
     }
 }
+
+/// A set has the faults that it is made of, and no other.
+#[test]
+fn a_set_of_faults_has_those_that_it_is_made_of() {
+    let all = Fault::ALL.into_iter();
+    for (one, other) in all
+        .clone()
+        .flat_map(|one| all.clone().map(move |other| (one, other)))
+    {
+        let set = Faults::of([one, other]);
+        for fault in Fault::ALL {
+            assert_eq!(set.contains(fault), fault == one || fault == other);
+        }
+    }
+}

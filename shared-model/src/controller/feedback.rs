@@ -133,25 +133,65 @@ impl<T: Real> OrbitFeedback<T> {
 mod tests {
     use super::*;
 
+    fn flip(number: &mut f32) {
+        *number = f32::from_bits(number.to_bits() ^ 1);
+    }
+
+    /// Also where the same bit of two of them differs.
     #[test]
     fn two_are_equal_if_their_numbers_are() {
         let one = OrbitFeedback::<f32>::new(&Scenario::reconstruction(), 3);
         assert_eq!(one, one);
         let changes: [fn(&mut OrbitFeedback<f32>); 9] = [
             |other| other.schedule = &DITHERED,
-            |other| other.rate_hz += 1.0,
-            |other| other.hysteresis_rpm += 1.0,
-            |other| other.ticks_to_start += 1,
-            |other| other.is_on = true,
-            |other| other.volts_per_nm += 1.0,
-            |other| other.limit_v += 1.0,
-            |other| other.step_v += 1.0,
-            |other| other.voltage_v = -0.0,
+            |other| flip(&mut other.rate_hz),
+            |other| flip(&mut other.hysteresis_rpm),
+            |other| other.ticks_to_start ^= 1,
+            |other| other.is_on ^= true,
+            |other| flip(&mut other.volts_per_nm),
+            |other| flip(&mut other.limit_v),
+            |other| flip(&mut other.step_v),
+            |other| flip(&mut other.voltage_v),
         ];
-        for (place, change) in changes.into_iter().enumerate() {
+        for (place, change) in changes.iter().enumerate() {
             let mut other = one;
             change(&mut other);
             assert_ne!(one, other, "{place}");
+            for (next, second) in changes.iter().enumerate().skip(place + 1) {
+                let mut both = other;
+                second(&mut both);
+                assert_ne!(one, both, "{place} and {next}");
+            }
+        }
+    }
+
+    /// On a margin within the table, off outside it, and no change at its ends themselves.
+    #[test]
+    fn switching_has_a_hysteresis_at_both_ends_of_the_table() {
+        let scenario = Scenario::<f32>::reconstruction();
+        let margin_rpm = scenario.controller.hysteresis_rpm;
+        let (first_rpm, last_rpm) = (UNDITHERED.first_rpm, UNDITHERED.last_rpm());
+        let middle_rpm = 0.5 * (first_rpm + last_rpm);
+        for (speeds_rpm, is_on) in [
+            (&[middle_rpm][..], true),
+            (&[first_rpm], false),
+            (&[last_rpm], false),
+            (&[first_rpm + margin_rpm], true),
+            (&[last_rpm - margin_rpm], true),
+            (&[first_rpm + 0.5 * margin_rpm], false),
+            (&[last_rpm - 0.5 * margin_rpm], false),
+            (&[middle_rpm, first_rpm], true),
+            (&[middle_rpm, last_rpm], true),
+            (&[middle_rpm, first_rpm - 0.1], false),
+            (&[middle_rpm, last_rpm + 0.1], false),
+            (&[middle_rpm, first_rpm - 0.1, first_rpm], false),
+            (&[middle_rpm, last_rpm + 0.1, last_rpm], false),
+        ] {
+            let mut feedback = OrbitFeedback::new(&scenario, 0);
+            for speed_rpm in speeds_rpm {
+                feedback.switch(*speed_rpm);
+            }
+            assert_eq!(feedback.is_on, is_on, "{speeds_rpm:?}");
         }
     }
 }

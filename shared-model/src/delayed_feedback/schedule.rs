@@ -164,6 +164,30 @@ mod tests {
     };
 
     #[test]
+    fn it_is_linear_between_the_speeds_and_ends_with_them() {
+        let rising = OrbitSchedule {
+            periods_s: [1.0, 2.0, 4.0],
+            gains: [8.0, 4.0, 3.0],
+            ..GOOD
+        };
+        let at = |rpm: f64| rising.at(rpm).map(|tuning| (tuning.period_s, tuning.gain));
+        for (rpm, wanted) in [
+            (1599.9, None),
+            (1600.0, Some((1.0, 8.0))),
+            (1612.5, Some((1.25, 7.0))),
+            (1650.0, Some((2.0, 4.0))),
+            (1675.0, Some((3.0, 3.5))),
+            (1700.0, Some((4.0, 3.0))),
+            (1700.1, None),
+            (-1650.0, None),
+            (f64::NAN, None),
+            (f64::INFINITY, None),
+        ] {
+            assert_eq!(at(rpm), wanted, "{rpm}");
+        }
+    }
+
+    #[test]
     fn a_schedule_has_a_period_and_a_gain_at_every_speed() {
         assert_eq!(GOOD.validate(2.2 + 1e-9), Ok(()));
         assert_eq!(GOOD.last_rpm(), 1700.0);

@@ -265,6 +265,28 @@ mod tests {
         }
     }
 
+    /// The bridge is reported on if both channels have it on.
+    #[test]
+    fn a_channel_reports_the_bridge_of_both() {
+        let actuation = |bridge_on| Actuation {
+            mode: Mode::Active,
+            faults: 0,
+            motor_voltage_v: 0.0,
+            dither_amplitude_v: 0.0,
+            wheel_speed_limit_rpm: 1000.0,
+            warnings: 0,
+            sensor_counter: 0,
+            bridge_on,
+            challenge: 0,
+        };
+        let mut task = ControlTask::<f32>::new(&scenario(), CLOCK_HZ);
+        for (own, other) in [(true, true), (true, false), (false, true), (false, false)] {
+            let of_both =
+                |one: &mut Channel<f32>| one.report(&actuation(own), &actuation(other)).0.bridge_on;
+            assert_eq!(task.channels.run(of_both), [own && other; 2]);
+        }
+    }
+
     /// A flipped bit may change a frame's content and leave both channels equal: only the frames
     /// differ.
     #[test]
