@@ -12,8 +12,10 @@ use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use qemu::session::{LinkKind, Session};
 use qemu::{Machine, RunError};
 use shared_model::Scenario;
+use shared_model::dither::Waveform;
 use shared_model::exchange::ToEcu;
 use shared_model::frame::decode_actuation;
+use shared_model::policy::Suppression;
 use shared_model::signal::Mode;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -102,6 +104,33 @@ fn every_manoeuvre_gives_the_same_commands_at_every_level() {
         files += 1;
     }
     assert!(files >= 8, "{files} manoeuvres");
+}
+
+/// Under the other ways to suppress, from where the delay line is full.
+#[test]
+fn every_manoeuvre_gives_the_same_commands_under_delayed_feedback() {
+    for file in [
+        "constant-speed.toml",
+        "delay-2.toml",
+        "low-resolution-noise.toml",
+        "sine-steer.toml",
+        "speed-ramp.toml",
+        "step-steer.toml",
+    ] {
+        for (suppression, waveform) in [
+            (Suppression::DelayedFeedback, Waveform::None),
+            (Suppression::Both, Waveform::Square),
+        ] {
+            let (mut scenario, manoeuvre) = manoeuvre(file, 6.0);
+            scenario.controller.suppression = suppression;
+            scenario.dither.waveform = waveform;
+            scenario.dither.start_time_s = 0.0;
+            let target = target(Machine::Mps2An386, LinkKind::Ticks);
+            let runs = run_all(&scenario, &manoeuvre, &target, || {})
+                .unwrap_or_else(|error| panic!("{file}: {error}"));
+            assert_agree(&runs);
+        }
+    }
 }
 
 #[test]

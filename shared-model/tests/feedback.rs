@@ -13,6 +13,8 @@ use shared_model::{Real, Scenario};
 use std::f64::consts::TAU;
 
 const TICKS_PER_S: u32 = 1000;
+/// The request that the tables are made for.
+const REQUEST_A: f32 = UNDITHERED.motor_current_a;
 const CLOCK_HZ: u32 = 25_000_000;
 /// Ticks after which the line reaches every period of the table back.
 const FULL_TICKS: u32 = 2300;
@@ -53,7 +55,10 @@ fn on_an_orbit(scenario: &Scenario<f32>, wheel_speed_rpm: f32) -> (Controller<f3
         .at(wheel_speed_rpm)
         .map_or(1.7, |tuning| tuning.period_s);
     for tick in 0..2 * FULL_TICKS {
-        controller.run(&at(wheel_speed_rpm, yaw_rate(tick, period_s), 0.0), true);
+        controller.run(
+            &at(wheel_speed_rpm, yaw_rate(tick, period_s), REQUEST_A),
+            true,
+        );
     }
     (controller, 2 * FULL_TICKS)
 }
@@ -81,7 +86,7 @@ fn a_periodic_motion_needs_no_torque() {
         let (mut controller, start) = on_an_orbit(&scenario(), speed_rpm);
         for tick in start..start + 2000 {
             let yaw_rate = yaw_rate(tick, tuning(speed_rpm).period_s);
-            let command = controller.run(&at(speed_rpm, yaw_rate, 0.0), true);
+            let command = controller.run(&at(speed_rpm, yaw_rate, REQUEST_A), true);
             assert!(
                 command.feedback_v.abs() < 2e-4 * V_PER_NM * 10.0,
                 "{command:?}"
@@ -89,7 +94,7 @@ fn a_periodic_motion_needs_no_torque() {
         }
         // K (gamma(t - T) - gamma(t)), 0.1 rad/s too much.
         let yaw_rate = yaw_rate(start + 2000, tuning(speed_rpm).period_s) + 0.1;
-        let command = controller.run(&at(speed_rpm, yaw_rate, 0.0), true);
+        let command = controller.run(&at(speed_rpm, yaw_rate, REQUEST_A), true);
         let wanted_v = -0.1 * tuning(speed_rpm).gain * V_PER_NM;
         let step_v = 100.0 / TICKS_PER_S as f32 * V_PER_NM;
         assert!(
@@ -106,7 +111,7 @@ fn there_is_no_torque_without_a_past_a_tuning_or_a_start() {
     let run = |scenario: &Scenario<f32>, speed_rpm: f32, ticks: u32| {
         let mut controller = Controller::new(scenario);
         (0..ticks).all(|tick| {
-            let command = controller.run(&at(speed_rpm, disturbed(tick), 0.0), true);
+            let command = controller.run(&at(speed_rpm, disturbed(tick), REQUEST_A), true);
             command.feedback_v == 0.0
         })
     };
@@ -159,7 +164,7 @@ fn the_suppression_chooses_dither_and_feedback() {
         scenario.dither.waveform = Waveform::Square;
         let mut controller = Controller::new(&scenario);
         let commands: Vec<Command<f32>> = (0..FULL_TICKS)
-            .map(|tick| controller.run(&at(1750.0, (tick % 97) as f32 / 97.0, 0.0), true))
+            .map(|tick| controller.run(&at(1750.0, (tick % 97) as f32 / 97.0, REQUEST_A), true))
             .collect();
         assert_eq!(commands.iter().any(|c| c.dither_amplitude_v > 0.0), dither);
         assert_eq!(commands.iter().any(|c| c.feedback_v != 0.0), feedback);
@@ -177,7 +182,7 @@ fn switching_is_without_a_jump_in_saturation_too() {
         // Half a second in which it is off, every second.
         let speed_rpm = if tick % 1000 < 500 { 1750.0 } else { 1400.0 };
         // Far from any orbit, so that the torque is at its limit.
-        let command = controller.run(&at(speed_rpm, yaw_rate(tick, 0.37) * 3.0, 0.0), true);
+        let command = controller.run(&at(speed_rpm, yaw_rate(tick, 0.37) * 3.0, REQUEST_A), true);
         assert!(
             (command.feedback_v - last_v).abs() <= step_v,
             "{tick}: {command:?}"
@@ -199,10 +204,10 @@ fn switching_is_without_a_jump_in_saturation_too() {
 fn without_a_new_measurement_the_torque_is_frozen() {
     let (mut controller, start) = on_an_orbit(&scenario(), 1750.0);
     let yaw_rate = yaw_rate(start, tuning(1750.0).period_s) + 0.05;
-    let before = controller.run(&at(1750.0, yaw_rate, 0.0), true);
+    let before = controller.run(&at(1750.0, yaw_rate, REQUEST_A), true);
     assert!(before.feedback_v != 0.0);
     for _ in 0..9 {
-        let frozen = controller.run(&at(1750.0, yaw_rate, 0.0), false);
+        let frozen = controller.run(&at(1750.0, yaw_rate, REQUEST_A), false);
         assert_eq!(frozen.feedback_v, before.feedback_v);
     }
 }
@@ -216,7 +221,7 @@ fn the_delay_adapts() {
         scenario.controller.feedback_adaptation_s3_per_rad2 = adaptation;
         let mut controller = Controller::new(&scenario);
         let period_s = tuning(1750.0).period_s + 0.012;
-        let command = |tick| controller.run(&at(1750.0, yaw_rate(tick, period_s), 0.0), true);
+        let command = |tick| controller.run(&at(1750.0, yaw_rate(tick, period_s), REQUEST_A), true);
         let last = (0..900_000).map(command).skip(898_000);
         last.fold(0.0_f32, |greatest, c| greatest.max(c.feedback_v.abs()))
     };
@@ -237,13 +242,18 @@ fn observed(command: &Command<f32>, measurement: Measurement<f32>) -> Observatio
     }
 }
 
+/// Near the tables', and any.
+fn requests_a() -> impl Strategy<Value = f32> {
+    prop_oneof![REQUEST_A - 0.6..REQUEST_A + 0.6, -20.0_f32..20.0]
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
     /// The gate passes the feedback beside any request, at any speeds, with and without dither.
     #[test]
     fn the_gate_passes_the_controllers_feedback(
-        legs in prop::collection::vec((1400.0_f32..2100.0, -20.0_f32..20.0, 0.2_f32..3.0, 0_u32..1500), 1..10),
+        legs in prop::collection::vec((1400.0_f32..2100.0, requests_a(), 0.2_f32..3.0, 0_u32..1500), 1..10),
         has_dither: bool,
         start_time_s in 0.0_f32..3.0,
     ) {
@@ -403,7 +413,7 @@ fn a_wrong_yaw_rate_ends_the_feedback() {
                 let measurement = Measurement {
                     steering_angle_rad: angle,
                     steering_rate_rad_per_s: rate,
-                    ..at(1750.0, yaw, 0.0)
+                    ..at(1750.0, yaw, REQUEST_A)
                 };
                 let command = controller.run(&measurement, measurement.is_finite());
                 supervisor.run(&observed(&command, measurement))

@@ -39,14 +39,6 @@ enum warning { FRAME_MISSING, FRAME_DAMAGED, FRAME_REPEATED, FRAME_SEQUENCE, FRA
 
 enum communication { NO_DATA, INIT, VALID, INVALID };
 
-struct measurement {
-    float wheel_speed_rpm;
-    float yaw_rate_rad_per_s;
-    float steering_angle_rad;
-    float steering_rate_rad_per_s;
-    float current_request_a;
-};
-
 struct command {
     float motor_v;
     float feedback_v;
@@ -335,8 +327,7 @@ static inline struct command controller_run(struct channel *channel, const struc
     const float motor_v = controller->motor_current_a * controller->winding_resistance_ohm;
     float feedback_v = 0.0f;
     if (controller->has_feedback)
-        feedback_v = feedback_run(&channel->feedback, &channel->line, now->wheel_speed_rpm, now->yaw_rate_rad_per_s, is_new,
-                                  motor_v);
+        feedback_v = feedback_run(&channel->feedback, &channel->line, now, is_new, motor_v);
     return (struct command){ motor_v, feedback_v, controller->amplitude_v };
 }
 

@@ -9,6 +9,8 @@
 #define LINE_RATE_HZ 50
 #define MOST_ADAPTED 0.1f
 #define ADAPTS_BELOW 0.25f
+#define ON_WITHIN_A 0.3f
+#define OFF_BEYOND_A 0.5f
 
 /* The last values of a signal. The channels do not compare it: a difference is one of the torque once it is read. */
 struct line {
@@ -17,6 +19,14 @@ struct line {
     uint32_t count;
     uint32_t spacing_ticks;
     uint32_t age_ticks;
+};
+
+struct measurement {
+    float wheel_speed_rpm;
+    float yaw_rate_rad_per_s;
+    float steering_angle_rad;
+    float steering_rate_rad_per_s;
+    float current_request_a;
 };
 
 struct feedback {
@@ -124,29 +134,32 @@ static inline bool tuning_at(const struct reference_orbits *orbits, float speed_
     return true;
 }
 
-static inline void switch_feedback(struct feedback *feedback, float speed_rpm)
+static inline void switch_feedback(struct feedback *feedback, float speed_rpm, float request_a)
 {
     const float first_rpm = feedback->orbits->first_rpm;
     const float last_rpm = first_rpm + feedback->orbits->step_rpm * (float)(ORBIT_POINTS - 1);
     const float margin_rpm = feedback->hysteresis_rpm;
+    const float away_a = fabsf(request_a - feedback->orbits->motor_current_a);
 
     if (feedback->ticks_to_start > 0) {
         feedback->ticks_to_start--;
-    } else if (speed_rpm < first_rpm || speed_rpm > last_rpm) {
+    } else if (speed_rpm < first_rpm || speed_rpm > last_rpm || away_a > OFF_BEYOND_A) {
         feedback->is_on = false;
-    } else if (!feedback->is_on && speed_rpm >= first_rpm + margin_rpm && speed_rpm <= last_rpm - margin_rpm) {
+    } else if (!feedback->is_on && speed_rpm >= first_rpm + margin_rpm && speed_rpm <= last_rpm - margin_rpm &&
+               away_a <= ON_WITHIN_A) {
         feedback->is_on = true;
         feedback->adapted_ticks = 0.0f;
     }
 }
 
 /* A tick: the feedback's share of the voltage. */
-static float __attribute__((noinline)) feedback_run(struct feedback *feedback, struct line *line, float speed_rpm,
-                                                    float yaw_rate, bool is_new, float motor_v)
+static float __attribute__((noinline)) feedback_run(struct feedback *feedback, struct line *line,
+                                                    const struct measurement *now, bool is_new, float motor_v)
 {
+    const float speed_rpm = now->wheel_speed_rpm, yaw_rate = now->yaw_rate_rad_per_s;
     float gain, period_s, wanted_v = 0.0f;
 
-    switch_feedback(feedback, speed_rpm);
+    switch_feedback(feedback, speed_rpm, now->current_request_a);
     if (feedback->is_on && tuning_at(feedback->orbits, speed_rpm, &gain, &period_s) && is_new) {
         wanted_v = feedback_torque_nm(feedback, line, yaw_rate, gain, period_s * feedback->rate_hz) *
                    feedback->volts_per_nm;

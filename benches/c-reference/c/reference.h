@@ -26,6 +26,7 @@ enum injection_kind { INJECTION_OFF, INJECTION_SQUARE_MEAN, INJECTION_SINE_MEAN,
 
 /* Periods of the orbits and gains of the delayed feedback: a table that both languages read. */
 struct reference_orbits {
+    float motor_current_a;
     float first_rpm;
     float step_rpm;
     const float *periods_s;

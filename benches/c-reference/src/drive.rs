@@ -62,10 +62,13 @@ impl Drive {
             },
             steering_angle_rad: x[STEERING_ANGLE],
             steering_rate_rad_per_s: x[STEERING_RATE],
-            current_request_a: match tick / 700 % 3 {
-                0 => 10.0,
+            // Beyond the limit, and away from the feedback's table and back.
+            current_request_a: match tick / 350 {
                 1 => 18.0,
-                _ => -5.0,
+                2 => -5.0,
+                4 => 10.2,
+                5 => 10.4,
+                _ => 10.0,
             },
         }
     }

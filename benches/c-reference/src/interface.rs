@@ -20,6 +20,7 @@ pub type Call = unsafe extern "C" fn(*mut c_void, *const c_void, *mut c_void);
 /// Periods and gains of the delayed feedback.
 #[repr(C)]
 struct Orbits {
+    motor_current_a: f32,
     first_rpm: f32,
     step_rpm: f32,
     periods_s: *const f32,
@@ -72,6 +73,7 @@ impl Choice {
             suppressing_waveform: number(scenario.suppressing_waveform()),
             has_feedback: scenario.controller.suppression.has_feedback().into(),
             orbits: Orbits {
+                motor_current_a: orbits.motor_current_a,
                 first_rpm: orbits.first_rpm,
                 step_rpm: orbits.step_rpm,
                 periods_s: orbits.periods_s.as_ptr(),

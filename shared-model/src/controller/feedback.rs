@@ -2,11 +2,19 @@
 
 use crate::Real;
 use crate::delayed_feedback::table::{DITHERED, POINTS, UNDITHERED};
-use crate::delayed_feedback::{DelayedFeedback, LINE_LEN, Law, OrbitSchedule, spacing_ticks};
+use crate::delayed_feedback::{
+    DelayedFeedback, LINE_LEN, Law, OrbitSchedule, Tuning, spacing_ticks,
+};
 use crate::dither::Waveform;
 use crate::limit::within;
 use crate::scenario::Scenario;
 use crate::signal::Measurement;
+
+/// Greatest distance of the driver's request from the current that the schedule is made for, A, for switching on and
+/// for staying on. Farther off the orbit is another one, and the torque stays at its limit and can make the motion
+/// greater.
+const ON_WITHIN_A: f64 = 0.3;
+const OFF_BEYOND_A: f64 = 0.5;
 
 /// Holds the orbit of one cycle at the measured wheel speed by a share of the servo voltage, which vanishes on
 /// the orbit.
@@ -79,11 +87,18 @@ impl<T: Real> OrbitFeedback<T> {
     #[inline(never)]
     pub fn run(&mut self, measurement: &Measurement<T>, is_new: bool, motor_v: T) -> T {
         let yaw_rate = measurement.yaw_rate_rad_per_s;
-        self.switch(measurement.wheel_speed_rpm);
-        let tuning = self
-            .schedule
-            .at(measurement.wheel_speed_rpm.to_f64() as f32);
-        let wanted_v = match tuning.filter(|_| self.is_on) {
+        let tuning = if self.ticks_to_start > 0 {
+            self.ticks_to_start -= 1;
+            None
+        } else {
+            self.tuning(measurement)
+        };
+        if tuning.is_some() && !self.is_on {
+            // What it has adapted to before is not the period at this speed.
+            self.feedback.restart();
+        }
+        self.is_on = tuning.is_some();
+        let wanted_v = match tuning {
             Some(tuning) if is_new => {
                 let [gain, period_s] =
                     [tuning.gain, tuning.period_s].map(|number| T::from_f64(number.into()));
@@ -96,6 +111,10 @@ impl<T: Real> OrbitFeedback<T> {
             }
             None => {
                 self.feedback.observe(yaw_rate);
+                // There is nothing left to limit.
+                if self.voltage_v == T::zero() {
+                    return T::zero();
+                }
                 T::zero()
             }
         };
@@ -105,27 +124,26 @@ impl<T: Real> OrbitFeedback<T> {
         self.voltage_v
     }
 
-    fn switch(&mut self, speed_rpm: T) {
-        if self.ticks_to_start > 0 {
-            self.ticks_to_start -= 1;
-            return;
-        }
+    /// The tuning at the wheel speed, if the feedback is to be on.
+    fn tuning(&self, measurement: &Measurement<T>) -> Option<Tuning<f32>> {
         let schedule = self.schedule;
-        let [first_rpm, last_rpm] =
-            [schedule.first_rpm, schedule.last_rpm()].map(|number| T::from_f64(number.into()));
-        if speed_rpm < first_rpm || speed_rpm > last_rpm {
-            self.is_on = false;
-            return;
+        let current_a = T::from_f64(schedule.motor_current_a.into());
+        let most_a = if self.is_on {
+            OFF_BEYOND_A
+        } else {
+            ON_WITHIN_A
+        };
+        if (measurement.current_request_a - current_a).abs() > T::from_f64(most_a) {
+            return None;
         }
+        let speed_rpm = measurement.wheel_speed_rpm.to_f64() as f32;
+        let tuning = schedule.at(speed_rpm)?;
         if self.is_on {
-            return;
+            return Some(tuning);
         }
-        let margin_rpm = self.hysteresis_rpm;
-        if speed_rpm >= first_rpm + margin_rpm && speed_rpm <= last_rpm - margin_rpm {
-            self.is_on = true;
-            // What it has adapted to before is not the period at this speed.
-            self.feedback.restart();
-        }
+        let margin_rpm = self.hysteresis_rpm.to_f64() as f32;
+        let range_rpm = schedule.first_rpm + margin_rpm..=schedule.last_rpm() - margin_rpm;
+        range_rpm.contains(&speed_rpm).then_some(tuning)
     }
 }
 
@@ -165,11 +183,26 @@ mod tests {
         }
     }
 
+    /// After these speeds (rpm) and requests (A), a tick each.
+    fn is_on_after(ticks: &[(f32, f32)]) -> bool {
+        let mut feedback = OrbitFeedback::new(&Scenario::<f32>::reconstruction(), 0);
+        for &(wheel_speed_rpm, current_request_a) in ticks {
+            let measurement = Measurement {
+                wheel_speed_rpm,
+                yaw_rate_rad_per_s: 0.0,
+                steering_angle_rad: 0.0,
+                steering_rate_rad_per_s: 0.0,
+                current_request_a,
+            };
+            feedback.run(&measurement, true, 0.0);
+        }
+        feedback.is_on
+    }
+
     /// On a margin within the table, off outside it, and no change at its ends themselves.
     #[test]
     fn switching_has_a_hysteresis_at_both_ends_of_the_table() {
-        let scenario = Scenario::<f32>::reconstruction();
-        let margin_rpm = scenario.controller.hysteresis_rpm;
+        let margin_rpm = Scenario::<f32>::reconstruction().controller.hysteresis_rpm;
         let (first_rpm, last_rpm) = (UNDITHERED.first_rpm, UNDITHERED.last_rpm());
         let middle_rpm = 0.5 * (first_rpm + last_rpm);
         for (speeds_rpm, is_on) in [
@@ -187,11 +220,32 @@ mod tests {
             (&[middle_rpm, first_rpm - 0.1, first_rpm], false),
             (&[middle_rpm, last_rpm + 0.1, last_rpm], false),
         ] {
-            let mut feedback = OrbitFeedback::new(&scenario, 0);
-            for speed_rpm in speeds_rpm {
-                feedback.switch(*speed_rpm);
-            }
-            assert_eq!(feedback.is_on, is_on, "{speeds_rpm:?}");
+            let ticks: std::vec::Vec<_> = speeds_rpm.iter().map(|rpm| (*rpm, 10.0)).collect();
+            assert_eq!(is_on_after(&ticks), is_on, "{speeds_rpm:?}");
+        }
+    }
+
+    /// The orbit is that of one torque of the motor.
+    #[test]
+    fn a_request_far_from_the_tables_switches_off() {
+        // Numbers that are exact: 0.5 and the f32 next to 0.3.
+        let within_a = ON_WITHIN_A as f32;
+        for (requests_a, is_on) in [
+            (&[10.0][..], true),
+            (&[10.25], true),
+            (&[9.75], true),
+            (&[10.0 + 1.01 * within_a], false),
+            (&[10.0 - 1.01 * within_a], false),
+            (&[-10.0], false),
+            (&[10.0, 10.5], true),
+            (&[10.0, 9.5], true),
+            (&[10.0, 10.51], false),
+            (&[10.0, 9.49], false),
+            (&[10.0, 12.0, 10.4], false),
+            (&[10.0, 12.0, 10.2], true),
+        ] {
+            let ticks: std::vec::Vec<_> = requests_a.iter().map(|a| (1750.0, *a)).collect();
+            assert_eq!(is_on_after(&ticks), is_on, "{requests_a:?}");
         }
     }
 }

@@ -14,9 +14,11 @@ pub struct Tuning<T> {
 }
 
 /// Periods and gains at equally spaced wheel speeds, between which they are interpolated. There is no orbit to
-/// hold below the first and above the last.
+/// hold below the first and above the last, and they are those of one torque of the motor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrbitSchedule<T, const POINTS: usize> {
+    /// Motor's current, A.
+    pub motor_current_a: T,
     /// First wheel speed, rpm.
     pub first_rpm: T,
     /// From one wheel speed to the next, rpm; greater than 0.
@@ -33,6 +35,7 @@ impl<T: Real, const POINTS: usize> OrbitSchedule<T, POINTS> {
     /// ```
     /// use shared_model::delayed_feedback::{OrbitSchedule, Tuning};
     /// let schedule = OrbitSchedule {
+    ///     motor_current_a: 10.0,
     ///     first_rpm: 1600.0,
     ///     step_rpm: 100.0,
     ///     periods_s: [1.5, 2.0],
@@ -51,9 +54,9 @@ impl<T: Real, const POINTS: usize> OrbitSchedule<T, POINTS> {
         }
         let whole = place.to_u32();
         let share = place - T::from_u32(whole);
-        let slower = whole as usize;
+        let slower = (whole as usize).min(last);
         // At the last speed itself there is no faster one, nor a share of it.
-        let faster = if slower < last { slower + 1 } else { last };
+        let faster = (slower + 1).min(last);
         let between = |values: &[T; POINTS]| {
             let (slower, faster) = (*values.get(slower)?, *values.get(faster)?);
             Some(slower + share * (faster - slower))
@@ -157,6 +160,7 @@ mod tests {
     use std::string::ToString;
 
     const GOOD: OrbitSchedule<f64, 3> = OrbitSchedule {
+        motor_current_a: 10.0,
         first_rpm: 1600.0,
         step_rpm: 50.0,
         periods_s: [2.0; 3],

@@ -14,6 +14,7 @@ pub const POINTS: usize = 23;
 
 /// Without dither.
 pub const UNDITHERED: OrbitSchedule<f32, POINTS> = OrbitSchedule {
+    motor_current_a: 10.0,
     first_rpm: 1560.0,
     step_rpm: 20.0,
     periods_s: [
@@ -70,6 +71,7 @@ pub const UNDITHERED: OrbitSchedule<f32, POINTS> = OrbitSchedule {
 
 /// Under the square dither of the ECU's schedule, which holds the orbit by itself.
 pub const DITHERED: OrbitSchedule<f32, POINTS> = OrbitSchedule {
+    motor_current_a: 10.0,
     first_rpm: 1560.0,
     step_rpm: 20.0,
     periods_s: [

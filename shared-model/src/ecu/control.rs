@@ -365,7 +365,8 @@ mod tests {
             yaw_rate_rad_per_s: 0.3 * Real::sin(0.005 * tick as f32),
             steering_angle_rad: 0.0,
             steering_rate_rad_per_s: 0.0,
-            current_request_a: 0.0,
+            // Without a request the controller alone has no motor voltage yet.
+            current_request_a: if tick < 1000 { 0.0 } else { 10.0 },
         };
         // A tick whose value the line keeps, in the past of the one channel.
         let changed_tick = 500;

@@ -25,7 +25,7 @@ pub fn run(
         format!("Made by `{command}`; not to be edited by hand."),
         format!("Parameters: {}.", parameters_in_words(scenario)),
     ];
-    let text = source(speeds_rpm, &entries, &made_by)?;
+    let text = source(scenario, speeds_rpm, &entries, &made_by)?;
     write_text(path, &text, force)?;
     say!(
         "{} wheel speeds, without and with dither",

@@ -3,7 +3,7 @@
 use pil::closed_loop::{Run, run};
 use pil::ecu::Software;
 use pil::feedback::{change_over_period, root_mean_square, torques_nm};
-use pil::manoeuvre::{Manoeuvre, from_text};
+use pil::manoeuvre::{Manoeuvre, from_text, load};
 use pil::record::Record;
 use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use shared_model::Scenario;
@@ -11,6 +11,7 @@ use shared_model::delayed_feedback::table::{DITHERED, UNDITHERED};
 use shared_model::dither::Waveform;
 use shared_model::policy::Suppression;
 use shared_model::signal::Mode;
+use std::path::Path;
 
 fn scenario(duration_s: f64) -> Scenario<f64> {
     let mut scenario = Scenario::reconstruction();
@@ -128,6 +129,51 @@ fn disturbances_end_in_no_fault() {
                 .iter()
                 .all(|r| r.motor_current_a.abs() <= limit_a)
         );
+    }
+}
+
+/// Ramps of the speed, a driver who steers, noise, and delay: active, without a fault, over the whole manoeuvre.
+#[test]
+fn every_manoeuvre_ends_in_no_fault() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/manoeuvres");
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder).unwrap().flatten() {
+        let (mut scenario, manoeuvre) = load(&entry.path()).unwrap();
+        for (suppression, waveform) in [
+            (Suppression::Both, Waveform::Square),
+            (Suppression::DelayedFeedback, Waveform::None),
+        ] {
+            scenario.controller.suppression = suppression;
+            scenario.dither.waveform = waveform;
+            let run = drive(&scenario, &manoeuvre);
+            let last = run.actuations.last().unwrap().unwrap();
+            let found = (last.mode, last.faults);
+            let name = &manoeuvre.name;
+            assert_eq!(found, (Mode::Active, 0), "{name}, {suppression:?}");
+        }
+        files += 1;
+    }
+    assert!(files >= 8, "{files} manoeuvres");
+}
+
+/// The orbit is that of one torque of the motor: at another request there is no torque of the feedback.
+#[test]
+fn a_request_unlike_the_tables_ends_the_feedback() {
+    let scenario = scenario(30.0);
+    let manoeuvre = manoeuvre(
+        "wheel_speed_rpm = [[0.0, 1750.0]]
+        current_request_a = [[0.0, 10.0], [10.0, 10.0], [10.001, 12.0], [20.0, 12.0], [20.001, 10.0]]",
+    );
+    let run = drive(&scenario, &manoeuvre);
+    assert_active(&run);
+    let torques_nm = torques_nm(&run.records, &scenario);
+    for (from_s, to_s, is_on) in [(4, 10, true), (11, 20, false), (22, 30, true)] {
+        let greatest_nm = torques_nm[1000 * from_s..1000 * to_s]
+            .iter()
+            .fold(0.0, |greatest: f64, torque_nm| {
+                greatest.max(torque_nm.abs())
+            });
+        assert_eq!(greatest_nm > 0.3, is_on, "{from_s} s: {greatest_nm} N m");
     }
 }
 

@@ -114,12 +114,13 @@ pub enum ScheduleError {
     Invalid(#[from] InvalidOrbits),
 }
 
-/// Source of `shared_model::delayed_feedback::table` for the entries without and with dither over the same speeds;
-/// `made_by` is the command and what it was run on, a sentence each. The text is formatted as rustfmt does.
+/// Source of `shared_model::delayed_feedback::table` for the entries without and with dither over the same speeds,
+/// at the scenario's motor current; `made_by` is the command and what it was run on, a sentence each. The text is formatted as rustfmt does.
 ///
 /// # Errors
 /// If a speed has no entry, or the ECU's delay line is too short for one.
 pub fn source(
+    scenario: &Scenario<f64>,
     speeds_rpm: &Values,
     entries: &[[Option<Entry>; 2]],
     made_by: &[String],
@@ -136,7 +137,8 @@ pub fn source(
     for (place, (name, about)) in TABLES.into_iter().enumerate() {
         let one = |both: &[Option<Entry>; 2]| both[place];
         let entries: Vec<_> = entries.iter().map(one).collect();
-        text += &table(name, about, &whole(speeds_rpm, &entries)?)?;
+        let motor_current_a = scenario.steering.motor_current_a;
+        text += &table(name, about, motor_current_a, &whole(speeds_rpm, &entries)?)?;
     }
     Ok(text)
 }
@@ -170,7 +172,12 @@ fn whole(speeds_rpm: &Values, entries: &[Option<Entry>]) -> Result<Vec<Entry>, S
     Ok(whole)
 }
 
-fn table(name: &str, about: &str, entries: &[Entry]) -> Result<String, ScheduleError> {
+fn table(
+    name: &str,
+    about: &str,
+    motor_current_a: f64,
+    entries: &[Entry],
+) -> Result<String, ScheduleError> {
     let [first, second, ..] = entries else {
         return Err(ScheduleError::OneSpeed);
     };
@@ -181,6 +188,7 @@ fn table(name: &str, about: &str, entries: &[Entry]) -> Result<String, ScheduleE
     for entry in entries {
         // The schedule's own check, a speed at a time: their number is known only at run time.
         let one = OrbitSchedule {
+            motor_current_a,
             first_rpm: entry.wheel_speed_rpm,
             step_rpm,
             periods_s: [entry.period_s],
@@ -189,7 +197,8 @@ fn table(name: &str, about: &str, entries: &[Entry]) -> Result<String, ScheduleE
         one.validate(SHORTEST_LINE_S)?;
     }
     let mut text = format!(
-        "\n/// {about}\npub const {name}: OrbitSchedule<f32, POINTS> = OrbitSchedule {{\n    first_rpm: {first_rpm:?},\n    \
+        "\n/// {about}\npub const {name}: OrbitSchedule<f32, POINTS> = OrbitSchedule {{\n    \
+         motor_current_a: {motor_current_a:?},\n    first_rpm: {first_rpm:?},\n    \
          step_rpm: {step_rpm:?},\n    periods_s: [\n"
     );
     for entry in entries {
