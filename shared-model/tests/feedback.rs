@@ -199,6 +199,25 @@ fn switching_is_without_a_jump_in_saturation_too() {
     );
 }
 
+/// Both shares together keep the limit of the motor's current, on the side of the driver's and on the other.
+#[test]
+fn the_feedback_has_what_the_driver_leaves() {
+    let mut scenario = scenario();
+    scenario.controller.motor_current_a = 11.0;
+    let resistance_ohm = scenario.servo.winding_resistance_ohm;
+    let mut controller = Controller::new(&scenario);
+    let (mut least_v, mut greatest_v) = (0.0_f32, 0.0_f32);
+    for tick in 0..6000 {
+        // Far from any orbit, so that the torque is at its limit.
+        let command = controller.run(&at(1750.0, 3.0 * yaw_rate(tick, 0.37), REQUEST_A), true);
+        least_v = least_v.min(command.feedback_v);
+        greatest_v = greatest_v.max(command.feedback_v);
+    }
+    let room_v = (11.0 - REQUEST_A) * resistance_ohm;
+    assert!((greatest_v - room_v).abs() < 1e-5, "{greatest_v} {room_v}");
+    assert!((least_v + 6.0 * V_PER_NM).abs() < 0.01, "{least_v}");
+}
+
 /// While frames are missing the torque stays.
 #[test]
 fn without_a_new_measurement_the_torque_is_frozen() {
