@@ -158,7 +158,7 @@ mod tests {
         }
     }
 
-    /// A ramp has no period: the delay adapts as far as it may.
+    /// A ramp has no period: the delay adapts up to its bound.
     #[test]
     fn the_delay_adapts_by_a_tenth_at_most() {
         let law = Law {
