@@ -108,7 +108,7 @@ fn every_manoeuvre_gives_the_same_commands_at_every_level() {
 
 /// Under the other ways to suppress, from where the delay line is full.
 #[test]
-fn every_manoeuvre_gives_the_same_commands_under_delayed_feedback() {
+fn manoeuvres_give_the_same_commands_under_delayed_feedback() {
     for file in [
         "constant-speed.toml",
         "delay-2.toml",

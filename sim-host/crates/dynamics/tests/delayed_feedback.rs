@@ -166,17 +166,12 @@ fn a_mix_of_signals_is_their_weighted_sum() {
 fn feedback_of_the_whole_state_leads_to_rest() {
     let scenario = Scenario::reconstruction();
     let speeds = Values::new("wheel speed (rpm)", 1700.0, 1950.0, 125.0).unwrap();
+    let yaw_rate = feedback(&at(1750.0).1, 0.0);
     let at_limit = |limit_nm| {
         let mut plan = Plan {
             feedback: Feedback {
-                component: Component::YAW_RATE,
-                mixed: None,
-                gain: 0.0,
-                delay_s: 0.0,
-                memory: 0.0,
                 limit_nm,
-                adaptation: 0.0,
-                latency_ticks: 0,
+                ..yaw_rate
             },
             gains: Values::new("gain", 4.0, 4.0, 1.0).unwrap(),
             delay_error_s: 0.0,

@@ -115,7 +115,8 @@ pub enum ScheduleError {
 }
 
 /// Source of `shared_model::delayed_feedback::table` for the entries without and with dither over the same speeds,
-/// at the scenario's motor current; `made_by` is the command and what it was run on, a sentence each. The text is formatted as rustfmt does.
+/// at the scenario's motor current; `made_by` is the command and what it was run on, a sentence each. The text is
+/// formatted as rustfmt does.
 ///
 /// # Errors
 /// If a speed has no entry, or the ECU's delay line is too short for one.
