@@ -72,6 +72,29 @@ fn every_link_leads_somewhere() {
 }
 
 /// A chapter that is not in the table of contents is not in the book.
+/// A command with `-p PACKAGE --example NAME` finds the example in one of the crates.
+#[test]
+fn every_example_that_is_named_is_there() {
+    let git = Command::new("git")
+        .args(["ls-files", "*/examples/*.rs"])
+        .current_dir(root())
+        .output()
+        .expect("git starts");
+    let sources = String::from_utf8(git.stdout).expect("names are UTF-8");
+    let mut named = 0;
+    for file in files() {
+        let text = fs::read_to_string(root().join(&file)).unwrap_or_default();
+        for rest in text.split("--example ").skip(1) {
+            let name = rest.split_whitespace().next().unwrap_or_default();
+            let source = format!("/examples/{}.rs", name.trim_matches('`'));
+            let is_there = |path: &str| path.ends_with(&source) && root().join(path).is_file();
+            assert!(sources.lines().any(is_there), "{file}: --example {name}");
+            named += 1;
+        }
+    }
+    assert!(named >= 3, "{named} examples");
+}
+
 #[test]
 fn every_chapter_is_in_the_book() {
     let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("it is there");
