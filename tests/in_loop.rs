@@ -45,7 +45,8 @@ fn run_in_loop(file: &str, duration_s: f64, machine: Machine, link: LinkKind) ->
     let (mut scenario, manoeuvre) = manoeuvre(file, duration_s);
     scenario.servo.timer_clock_hz = machine.timer_clock_hz();
     let target = target(machine, link);
-    run_all(&scenario, &manoeuvre, &target, || {}).unwrap_or_else(|error| panic!("{file}: {error}"))
+    run_all(&scenario, &manoeuvre, &target, &mut || {})
+        .unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
 fn on_target(link: LinkKind) -> ProcessorRun {
@@ -53,7 +54,7 @@ fn on_target(link: LinkKind) -> ProcessorRun {
     let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
     let ecu = ecu_scenario(&scenario, &manoeuvre);
     let target = target(Machine::Mps2An386, link);
-    on_processor(&ecu, vehicle, &target, || {}).unwrap_or_else(|error| panic!("{error}"))
+    on_processor(&ecu, vehicle, &target, &mut || {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn assert_agree(runs: &MilSilPil) {
@@ -126,7 +127,7 @@ fn manoeuvres_give_the_same_commands_under_delayed_feedback() {
             scenario.dither.waveform = waveform;
             scenario.dither.start_time_s = 0.0;
             let target = target(Machine::Mps2An386, LinkKind::Ticks);
-            let runs = run_all(&scenario, &manoeuvre, &target, || {})
+            let runs = run_all(&scenario, &manoeuvre, &target, &mut || {})
                 .unwrap_or_else(|error| panic!("{file}: {error}"));
             assert_agree(&runs);
         }
@@ -170,7 +171,7 @@ fn a_tick_has_any_allowed_number_of_periods() {
         scenario.run.pwm_rate_hz = pwm_rate_hz;
         scenario.run.control_rate_hz = control_rate_hz;
         let target = target(Machine::Mps2An386, LinkKind::Ticks);
-        let runs = run_all(&scenario, &manoeuvre, &target, || {});
+        let runs = run_all(&scenario, &manoeuvre, &target, &mut || {});
         let runs = runs.unwrap_or_else(|error| panic!("{pwm_rate_hz} Hz: {error}"));
         assert!(
             runs.agree(),
@@ -233,7 +234,7 @@ fn one_changed_bit_of_a_command_is_seen() {
     let (scenario, manoeuvre) = manoeuvre("constant-speed.toml", 0.2);
     let mut ecu = Software::new(&ecu_scenario(&scenario, &manoeuvre)).expect("it is valid");
     let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
-    let exchanges = run(&mut ecu, vehicle, || {})
+    let exchanges = run(&mut ecu, vehicle, &mut || {})
         .expect("it runs on the host")
         .exchanges;
     let with_frame = exchanges

@@ -174,7 +174,7 @@ fn every_manoeuvre_gives_the_commands_of_the_host_over_the_bus() {
             link: LinkKind::Uart,
             time_out: LIMIT,
         };
-        let runs = run_all(&scenario, &manoeuvre, &target, || {});
+        let runs = run_all(&scenario, &manoeuvre, &target, &mut || {});
         let runs = runs.unwrap_or_else(|error| panic!("{}: {error}", manoeuvre.name));
         assert!(runs.agree(), "{}: {:?}", runs.name, runs.software_processor);
         assert!(runs.software_processor.duties >= 2000);

@@ -219,7 +219,8 @@ fn drive() -> Instructions {
     };
     let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("the example is valid");
     let ecu = ecu_scenario(&scenario, &manoeuvre);
-    let run = on_processor(&ecu, vehicle, &target, || {}).unwrap_or_else(|error| panic!("{error}"));
+    let run =
+        on_processor(&ecu, vehicle, &target, &mut || {}).unwrap_or_else(|error| panic!("{error}"));
     Instructions::in_loop(&run.costs, &scenario, target.machine)
 }
 

@@ -147,7 +147,8 @@ static DECODER: LazyLock<LogDecoder> = LazyLock::new(|| {
 fn read_log(bytes: &[u8]) {
     assert!(DECODER.is_readable());
     let mut longest = 0;
-    DECODER.decode(bytes, |line| longest = longest.max(line.len()));
+    let mut console = bytes;
+    DECODER.decode(&mut console, &mut |line| longest = longest.max(line.len()));
     assert!(longest < 1 << 15);
 }
 

@@ -158,7 +158,7 @@ fn recording_seeds() -> Vec<Vec<u8>> {
     let ecu = ecu_scenario(&scenario, &manoeuvre);
     let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it can be driven");
     let software = &mut Software::new(&ecu).expect("the scenario is valid");
-    let mut driven = run(software, vehicle, || {}).expect("it is driven");
+    let mut driven = run(software, vehicle, &mut || {}).expect("it is driven");
     driven.exchanges.truncate(60);
     let recording = Recording {
         scenario: ecu,

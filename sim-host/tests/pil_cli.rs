@@ -63,7 +63,7 @@ fn recording() -> Vec<u8> {
     let mut ecu = Software::new(&own).expect("it is valid");
     let recording = Recording {
         scenario: own,
-        exchanges: run(&mut ecu, vehicle, || {})
+        exchanges: run(&mut ecu, vehicle, &mut || {})
             .expect("on the host")
             .exchanges,
     };

@@ -81,7 +81,7 @@ pub fn run(
     limit: Duration,
 ) -> Result<Finished, RunError> {
     let log = LogDecoder::new(image).map_err(RunError::Log)?;
-    qemu::run_with(&log, image, machine, settings, folder, limit, |_| {})
+    qemu::run_with(&log, image, machine, settings, folder, limit, &|_| {})
 }
 
 /// Runs the ECU with a scenario to its end and reads its telemetry.

@@ -97,7 +97,7 @@ fn on_host(quick: bool) -> anyhow::Result<Vec<Row>> {
         .collect::<Result<Vec<_>, _>>()?;
     let faults = catalogue::all();
     let progress = progress(host::runs(&fault_free, &faults));
-    let rows = host::inject(&fault_free, &faults, || progress.inc(1));
+    let rows = host::inject(&fault_free, &faults, &|| progress.inc(1));
     progress.finish_and_clear();
     Ok(rows?)
 }

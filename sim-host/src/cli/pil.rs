@@ -222,7 +222,7 @@ fn with_progress(
     );
     bar.set_message(manoeuvre.name.clone());
     let mut periods = 0;
-    let runs = run_all(scenario, manoeuvre, target, || {
+    let runs = run_all(scenario, manoeuvre, target, &mut || {
         periods += 1;
         if periods % REPORTED == 0 {
             bar.set_position(periods);

@@ -5,7 +5,6 @@ use super::outcome::Outcome;
 use super::output::check;
 use anyhow::bail;
 use dynamics::simulate::{early_end, simulate};
-use dynamics::trace::Trace;
 use dynamics::words::counted;
 use files::output;
 use std::path::PathBuf;
@@ -44,7 +43,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(end) = early_end(&scenario, &trace) {
         bail!("{end}; no file was written. {}", advice(end.reason));
     }
-    write(&trace, &arguments.out, arguments.force)?;
+    output::write(&arguments.out, arguments.force, |to| {
+        Ok(trace.write_csv(to)?)
+    })?;
     say!(
         "{} over {} s in {}",
         counted(trace.states.len(), "state"),
@@ -52,30 +53,4 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         arguments.out.display()
     );
     Ok(Outcome::Success)
-}
-
-/// Writes a trajectory as CSV, one row per model step; the duty code is that of the step's last PWM
-/// period.
-pub fn write(trace: &Trace, path: &std::path::Path, force: bool) -> anyhow::Result<()> {
-    Ok(output::write(path, force, |to| {
-        let mut csv = csv::Writer::from_writer(to);
-        csv.write_record([
-            "time_s",
-            "sideslip_rad",
-            "yaw_rate_rad_per_s",
-            "steering_angle_rad",
-            "steering_rate_rad_per_s",
-            "friction_mode",
-            "duty_code",
-        ])?;
-        let duties = trace.duties.chunks(trace.samples_per_step);
-        for (k, (state, duties)) in trace.states.iter().zip(duties).enumerate() {
-            let mut row = vec![trace.time_s(k).to_string()];
-            row.extend(state.x.iter().map(f64::to_string));
-            row.push(format!("{:?}", state.friction).to_lowercase());
-            row.push(duties.last().map_or(String::new(), u16::to_string));
-            csv.write_record(row)?;
-        }
-        Ok(csv.flush()?)
-    })?)
 }

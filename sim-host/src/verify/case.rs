@@ -284,7 +284,7 @@ fn run_firmware(
             &settings,
             folder.path(),
             options.time_out,
-            |_| {},
+            &|_| {},
         );
         drop(finish);
         run

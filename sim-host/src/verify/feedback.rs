@@ -94,7 +94,7 @@ fn same_before(
     let start_s = scenario.dither.start_time_s.min(scenario.run.duration_s);
     without.run.duration_s = start_s.max(1.0 / scenario.run.control_rate_hz);
     let mut ecu = Software::new(&ecu_scenario(&without, manoeuvre))?;
-    let free = closed_loop::run(&mut ecu, VehicleNode::new(&without, manoeuvre)?, || {})?;
+    let free = closed_loop::run(&mut ecu, VehicleNode::new(&without, manoeuvre)?, &mut || {})?;
     let pairs = run.records.iter().zip(&free.records);
     let differing = pairs.filter(|(a, b)| a != b).count();
     let check = Check::equals(

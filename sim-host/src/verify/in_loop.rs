@@ -77,7 +77,7 @@ fn one(
             source: Box::new(source),
         }
     };
-    let levels = run_all(&scenario, &manoeuvre, &target, || {}).map_err(failed)?;
+    let levels = run_all(&scenario, &manoeuvre, &target, &mut || {}).map_err(failed)?;
     let id = format!("in-loop-{name}");
     let instructions = Instructions::in_loop(&levels.processor.costs, &scenario, target.machine);
     let mut checks = checks(&id, &levels);

@@ -3,10 +3,9 @@
 
 use crate::period::{Period, RIPPLE_TOLERANCE, TOLERANCE, period};
 use crate::simulate::{settle, simulate, started_at};
-use crate::sweep::SweepError;
+use crate::sweep::{SweepError, side_by_side};
 use crate::trace::Trace;
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
-use rayon::prelude::*;
 use serde::Serialize;
 use shared_model::dither::{Application, Waveform};
 use shared_model::vehicle::YAW_RATE;
@@ -64,10 +63,10 @@ pub fn compare(
     base.dither.start_time_s = 0.0;
     base.run.duration_s = DITHER_TRANSIENT_S + MOTION_S;
     base.servo.timer_clock_hz = TIMER_CLOCK_HZ;
-    frequencies_rad_per_s
-        .par_iter()
-        .map(|&frequency| Ok(compare_at(&base, frequency)?))
-        .collect()
+    let compared = side_by_side(frequencies_rad_per_s.len(), |k| {
+        compare_at(&base, frequencies_rad_per_s[k])
+    });
+    Ok(compared.into_iter().collect::<Result<_, _>>()?)
 }
 
 fn compare_at(

@@ -34,6 +34,12 @@ pub enum ConfigError {
         /// The known key most like it.
         near: Option<String>,
     },
+    /// A parameter that must be there is not.
+    #[error("the key {key} is missing")]
+    MissingKey {
+        /// The key.
+        key: String,
+    },
     /// A value of the wrong kind.
     #[error("{key} = {found}: must be {expected}")]
     WrongKind {
@@ -91,10 +97,43 @@ pub fn over_preset(
         (None, Some(other)) => return Err(wrong_kind(PRESET, other, "a name")),
         (None, None) => Preset::Reconstruction,
     };
-    let mut table = table_of(&Scenario::preset(base));
-    merge(&mut table, over, "")?;
-    let scenario: Scenario<f64> = table.try_into().expect("merged over a complete scenario");
+    let mut scenario = Scenario::preset(base);
+    let complete = table_of(&scenario);
+    put(over, &mut scenario, &complete, "")?;
     Ok(scenario)
+}
+
+/// The scenario of a complete TOML file.
+///
+/// # Errors
+/// If it is no TOML, lacks a parameter, has a key that no parameter has, or a value of the wrong
+/// kind.
+pub fn from_toml(text: &str) -> Result<Scenario<f64>, ConfigError> {
+    let table: Table = text.parse().map_err(|source| ConfigError::Syntax {
+        path: "the configuration".into(),
+        source,
+    })?;
+    let mut scenario = Scenario::reconstruction();
+    let complete = table_of(&scenario);
+    if let Some(key) = first_missing(&complete, &table, "") {
+        return Err(ConfigError::MissingKey { key });
+    }
+    put(table, &mut scenario, &complete, "")?;
+    Ok(scenario)
+}
+
+/// The first key of a complete scenario that another table lacks.
+fn first_missing(complete: &Table, table: &Table, prefix: &str) -> Option<String> {
+    complete.iter().find_map(|(name, value)| {
+        let key = format!("{prefix}{name}");
+        match (value, table.get(name)) {
+            (_, None) => Some(key),
+            (Value::Table(value), Some(Value::Table(inner))) => {
+                first_missing(value, inner, &format!("{key}."))
+            }
+            _ => None,
+        }
+    })
 }
 
 /// Checks a scenario in both arithmetics that it is run in.
@@ -184,29 +223,47 @@ pub fn read(path: &Path) -> Result<Table, ConfigError> {
     })
 }
 
-/// Replaces values of `base` by those of `over`. The base is complete, so a key that it lacks is
-/// unknown.
-fn merge(base: &mut Table, over: Table, prefix: &str) -> Result<(), ConfigError> {
+/// Puts the values of `over` into the scenario. A key that is not in the `complete` table is
+/// unknown, and its values have the kinds that are expected.
+fn put(
+    over: Table,
+    scenario: &mut Scenario<f64>,
+    complete: &Table,
+    prefix: &str,
+) -> Result<(), ConfigError> {
     for (name, value) in over {
         let key = format!("{prefix}{name}");
-        let Some(place) = base.get_mut(&name) else {
-            let near = nearest(&name, base.keys()).map(|near| format!("{prefix}{near}"));
+        let Some(usual) = complete.get(&name) else {
+            let near = nearest(&name, complete.keys()).map(|near| format!("{prefix}{near}"));
             return Err(ConfigError::UnknownKey { key, near });
         };
-        match (place, value) {
-            (Value::Table(inner), Value::Table(value)) => {
-                merge(inner, value, &format!("{key}."))?;
+        match (usual, value) {
+            (Value::Table(inner), Value::Table(over)) => {
+                put(over, scenario, inner, &format!("{key}."))?;
             }
-            (place @ Value::Float(_), Value::Integer(value)) => *place = Value::Float(value as f64),
-            (place @ Value::Float(_), value @ Value::Float(_))
-            | (place @ Value::Boolean(_), value @ Value::Boolean(_)) => *place = value,
-            (place @ Value::String(_), Value::String(value)) => {
-                *place = Value::String(choice(&key, value)?);
-            }
-            (place, value) => return Err(wrong_kind(&key, &value, kind(place))),
+            (Value::Float(_), Value::Float(value)) => set(scenario, &key, value),
+            (Value::Float(_), Value::Integer(value)) => set(scenario, &key, value as f64),
+            (Value::Boolean(_), value @ Value::Boolean(_))
+            | (Value::String(_), value @ Value::String(_)) => choose(scenario, &key, &value)?,
+            (usual, value) => return Err(wrong_kind(&key, &value, kind(usual))),
         }
     }
     Ok(())
+}
+
+fn set(scenario: &mut Scenario<f64>, key: &str, value: f64) {
+    *scenario.number(key).expect("a number of every scenario") = value;
+}
+
+/// Sets a parameter that is one of a few names.
+fn choose(scenario: &mut Scenario<f64>, key: &str, value: &Value) -> Result<(), ConfigError> {
+    let name = value
+        .as_str()
+        .map_or_else(|| value.to_string(), str::to_owned);
+    scenario.apply(&format!("{key}={name}")).map_err(|_| {
+        let names = choices(key).unwrap_or_default();
+        wrong_kind(key, value, &format!("one of {}", names.join(", ")))
+    })
 }
 
 /// The names that the parameter of that key can have; `None` if it is none with names.
@@ -223,16 +280,6 @@ fn choices(key: &str) -> Option<Vec<&'static str>> {
         "controller.suppression" => Some(names::<Suppression>()),
         _ => None,
     }
-}
-
-/// The value of a parameter that is one of a few names, if it is one of them.
-fn choice(key: &str, value: String) -> Result<String, ConfigError> {
-    let names = choices(key).unwrap_or_default();
-    if names.contains(&value.as_str()) {
-        return Ok(value);
-    }
-    let expected = format!("one of {}", names.join(", "));
-    Err(wrong_kind(key, &Value::String(value), &expected))
 }
 
 fn kind(value: &Value) -> &'static str {
@@ -256,4 +303,58 @@ fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a String>) -> Option<&'
     let scored = known.map(|known| (strsim::jaro_winkler(name, known), known));
     let best = scored.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (best.0 > 0.7).then_some(best.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shared_model::dither::Waveform;
+
+    /// Every number another one, and some of the names.
+    fn other() -> Scenario<f64> {
+        let mut other = Scenario::<f64>::printed().map(&|value| 1.5 * value + 0.1);
+        other.dither.waveform = Waveform::Square;
+        other
+    }
+
+    #[test]
+    fn a_file_is_read_back_to_the_last_bit() {
+        assert_eq!(from_toml(&to_toml(&other())).unwrap(), other());
+    }
+
+    #[test]
+    fn a_complete_file_lacks_nothing_and_has_nothing_else() {
+        let text = to_toml(&other());
+        for line in text.lines().filter(|line| line.contains(" = ")) {
+            let (name, _) = line.split_once(" = ").unwrap();
+            let error = from_toml(&text.replacen(&format!("{line}\n"), "", 1)).unwrap_err();
+            assert!(
+                matches!(&error, ConfigError::MissingKey { key } if key.ends_with(name)),
+                "{line}: {error}"
+            );
+        }
+        let unknown = from_toml(&text.replace("[run]\n", "[run]\nspeed = 1.0\n")).unwrap_err();
+        assert_eq!(
+            unknown.to_string(),
+            "unknown key run.speed; `sim-host config` prints all keys"
+        );
+        let empty = from_toml("").unwrap_err();
+        assert_eq!(empty.to_string(), "the key controller is missing");
+    }
+
+    #[test]
+    fn a_file_over_a_preset_keeps_the_rest() {
+        let over = "preset = \"printed\"\nrun.wheel_speed_rpm = 1600\nfriction.dithered = false";
+        let mut expected = Scenario::printed();
+        expected.run.wheel_speed_rpm = 1600.0;
+        expected.friction.dithered = false;
+        let read = over_preset(over.parse().unwrap(), None);
+        assert_eq!(read.unwrap(), expected);
+        let no_name = over_preset("friction.law = \"other\"".parse().unwrap(), None);
+        let no_name = no_name.unwrap_err().to_string();
+        assert!(
+            no_name.starts_with("friction.law = \"other\": must be one of "),
+            "{no_name}"
+        );
+    }
 }

@@ -19,7 +19,7 @@ const TOLERANCE: f64 = 1e-10;
 ///
 /// # Errors
 /// If a scenario is not valid.
-pub fn observe<const K: usize, R: Send>(
+pub fn observe<const K: usize, R: Send + Sync>(
     scenarios: &[Scenario<f64>],
     timing: Timing,
     observables: Observables,

@@ -8,8 +8,11 @@
 
 use crate::words::counted;
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
-use realfft::RealFftPlanner;
+use rustfft::algorithm::{BluesteinsAlgorithm, Radix4};
+use rustfft::num_complex::Complex;
+use rustfft::{Fft, FftDirection};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// Fewest samples in a segment: a line and its surroundings are told apart.
 pub const MIN_SEGMENT: usize = 16;
@@ -100,20 +103,17 @@ pub fn welch(signal: &[f64], rate_hz: f64, segment: usize) -> Result<PowerSpectr
     let window: Vec<f64> = (0..segment)
         .map(|k| 0.5 - 0.5 * (TAU * k as f64 / segment as f64).cos())
         .collect();
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(segment);
-    let mut input = transform.make_input_vec();
-    let mut output = transform.make_output_vec();
-    let mut sums = vec![0.0; output.len()];
+    let transform = fourier_transform(segment);
+    let mut buffer = vec![Complex::default(); segment];
+    let mut sums = vec![0.0; segment / 2 + 1];
     let mut segments = 0;
     for piece in signal.windows(segment).step_by(segment / 2) {
         let mean = piece.iter().sum::<f64>() / segment as f64;
-        for ((place, value), weight) in input.iter_mut().zip(piece).zip(&window) {
-            *place = (value - mean) * weight;
+        for ((place, value), weight) in buffer.iter_mut().zip(piece).zip(&window) {
+            *place = Complex::from((value - mean) * weight);
         }
-        transform
-            .process(&mut input, &mut output)
-            .expect("the transform made these vectors");
-        for (sum, value) in sums.iter_mut().zip(&output) {
+        transform.process(&mut buffer);
+        for (sum, value) in sums.iter_mut().zip(&buffer) {
             *sum += value.norm_sqr();
         }
         segments += 1;
@@ -135,6 +135,17 @@ pub fn welch(signal: &[f64], rate_hz: f64, segment: usize) -> Result<PowerSpectr
         segments,
         density,
     })
+}
+
+/// Chosen here and not by rustfft's planner, whose transforms for every prime length take longer to
+/// compile than any spectrum takes.
+fn fourier_transform(length: usize) -> Arc<dyn Fft<f64>> {
+    let of_power_of_two = |length| Arc::new(Radix4::new(length, FftDirection::Forward));
+    if length.is_power_of_two() {
+        return of_power_of_two(length);
+    }
+    let inner = of_power_of_two((2 * length - 1).next_power_of_two());
+    Arc::new(BluesteinsAlgorithm::new(length, inner))
 }
 
 impl PowerSpectrum {

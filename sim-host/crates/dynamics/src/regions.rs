@@ -5,9 +5,8 @@ use crate::equilibria;
 use crate::observe::is_supported;
 use crate::settled::end_of_orbit;
 use crate::simulate::started_at;
-use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios};
+use crate::sweep::{Parameter, RunControl, SweepError, Timing, Values, scenarios, side_by_side};
 use plot::chart::{AxisSpec, Chart, Look, Panel, Series};
-use rayon::prelude::*;
 use shared_model::Scenario;
 use shared_model::vehicle::Model;
 
@@ -218,10 +217,11 @@ fn sweep(
 
 /// Decides trajectories that have not settled by the orbit or equilibrium beside them.
 fn decide(scenarios: &[Scenario<f64>], found: &mut [Option<Attractor>]) {
-    let pairs = scenarios.par_iter().zip(found);
-    pairs.for_each(|(scenario, found)| {
-        *found = found.take().map(|attractor| attractor.decided(scenario));
+    let decided = side_by_side(found.len(), |k| {
+        let attractor = found[k].clone();
+        attractor.map(|attractor| attractor.decided(&scenarios[k]))
     });
+    found.clone_from_slice(&decided);
 }
 
 /// Continues the trajectories that are undecided for longer: near a bifurcation they leave an orbit as

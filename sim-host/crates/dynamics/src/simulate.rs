@@ -24,8 +24,30 @@ pub enum Unsettled {
 ///
 /// # Errors
 /// If the scenario is not valid.
-pub fn simulate<T: Real>(scenario: &Scenario<T>) -> Result<Trace, InvalidScenario> {
-    Ok(record(&mut OpenLoop::new(scenario)?, scenario))
+pub fn simulate<T: Compiled>(scenario: &Scenario<T>) -> Result<Trace, InvalidScenario> {
+    T::simulate(scenario)
+}
+
+/// An arithmetic for which this crate holds compiled code, so that callers do not compile the model
+/// again.
+pub trait Compiled: Real {
+    /// Runs a scenario to its end.
+    ///
+    /// # Errors
+    /// If the scenario is not valid.
+    fn simulate(scenario: &Scenario<Self>) -> Result<Trace, InvalidScenario>;
+}
+
+impl Compiled for f32 {
+    fn simulate(scenario: &Scenario<f32>) -> Result<Trace, InvalidScenario> {
+        Ok(motion(&mut OpenLoop::new(scenario)?, scenario))
+    }
+}
+
+impl Compiled for f64 {
+    fn simulate(scenario: &Scenario<f64>) -> Result<Trace, InvalidScenario> {
+        Ok(motion(&mut OpenLoop::new(scenario)?, scenario))
+    }
 }
 
 /// The program of a scenario whose dither is on from the start, after a transient of `transient_s`.
@@ -89,7 +111,11 @@ pub fn early_end(scenario: &Scenario<f64>, trace: &Trace) -> Option<EarlyEnd> {
 }
 
 /// Records the motion of a scenario from the program's present state on, for the scenario's length.
-pub fn record<T: Real>(ecu: &mut OpenLoop<T>, scenario: &Scenario<T>) -> Trace {
+pub fn record(ecu: &mut OpenLoop<f64>, scenario: &Scenario<f64>) -> Trace {
+    motion(ecu, scenario)
+}
+
+fn motion<T: Real>(ecu: &mut OpenLoop<T>, scenario: &Scenario<T>) -> Trace {
     let steps = scenario.steps() as usize;
     let samples_per_step = scenario.samples_per_step() as usize;
     let initial = ecu.control.state().map(Real::to_f64);
@@ -114,7 +140,7 @@ pub fn record<T: Real>(ecu: &mut OpenLoop<T>, scenario: &Scenario<T>) -> Trace {
 ///
 /// # Errors
 /// If the scenario is not valid, or the motion leaves all bounds.
-pub fn settle<T: Real>(scenario: &Scenario<T>, time_s: f64) -> Result<State<T>, Unsettled> {
+pub fn settle(scenario: &Scenario<f64>, time_s: f64) -> Result<State<f64>, Unsettled> {
     let mut scenario = *scenario;
     scenario.dither.waveform = shared_model::dither::Waveform::None;
     let mut motion = Stepper::new(&scenario)?;
@@ -123,7 +149,7 @@ pub fn settle<T: Real>(scenario: &Scenario<T>, time_s: f64) -> Result<State<T>, 
 }
 
 /// The scenario started in the given state.
-pub fn started_at<T: Real>(scenario: &Scenario<T>, state: &State<T>) -> Scenario<T> {
+pub fn started_at(scenario: &Scenario<f64>, state: &State<f64>) -> Scenario<f64> {
     let mut scenario = *scenario;
     let run = &mut scenario.run;
     run.sideslip_rad = state.x[0];

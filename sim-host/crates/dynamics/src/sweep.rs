@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use shared_model::dither::Waveform;
 use shared_model::vehicle::State;
 use shared_model::{InvalidScenario, Scenario};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Most values of one range.
@@ -411,18 +412,18 @@ impl RunControl<'_> {
 
     /// Independent work on many items at once. Results are in the items' order whatever the number
     /// of threads; items that were not begun, or interrupted, have none.
-    pub fn points<T: Sync, R: Send>(
+    pub fn points<T: Sync, R: Send + Sync>(
         &self,
         items: &[T],
         work: impl Fn(&T) -> R + Sync,
     ) -> Vec<Option<R>> {
-        let one = |item| self.point(|| work(item));
-        items.par_iter().with_max_len(1).map(one).collect()
+        let one = |k: usize| self.point(|| work(&items[k]));
+        side_by_side(items.len(), one)
     }
 
     /// The same for work that takes a batch of items and gives a result for each. Batches are of a
     /// size, and as many as keep all threads busy.
-    pub fn batches<T: Sync, R: Send>(
+    pub fn batches<T: Sync, R: Send + Sync>(
         &self,
         items: &[T],
         work: impl Fn(&[T]) -> Vec<R> + Sync,
@@ -440,7 +441,31 @@ impl RunControl<'_> {
         let threads = rayon::current_num_threads();
         let rounds = items.len().div_ceil(LARGEST_BATCH * threads);
         let length = items.len().div_ceil((rounds * threads).max(1)).max(1);
-        let batches = items.par_chunks(length).with_max_len(1);
-        batches.flat_map_iter(one).collect()
+        let batches: Vec<&[T]> = items.chunks(length).collect();
+        let results = side_by_side(batches.len(), |k| one(batches[k]));
+        results.into_iter().flatten().collect()
     }
+}
+
+/// The results of `work` for 0 to `count` - 1, in that order, computed on all threads.
+pub(crate) fn side_by_side<R: Send + Sync>(
+    count: usize,
+    work: impl Fn(usize) -> R + Sync,
+) -> Vec<R> {
+    let results: Vec<OnceLock<R>> = (0..count).map(|_| OnceLock::new()).collect();
+    on_all_threads(count, &|k| {
+        results[k].get_or_init(|| work(k));
+    });
+    let results = results.into_iter().map(OnceLock::into_inner);
+    results
+        .map(|result| result.expect("every number was worked on"))
+        .collect()
+}
+
+/// Compiled once: rayon's own collection is some 2000 lines of code for every kind of result.
+fn on_all_threads(count: usize, work: &(dyn Fn(usize) + Sync)) {
+    (0..count)
+        .into_par_iter()
+        .with_max_len(1)
+        .for_each(|k| work(k));
 }

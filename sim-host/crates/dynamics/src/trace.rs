@@ -3,6 +3,7 @@
 use engine::is_bounded;
 use nalgebra::Vector4;
 use shared_model::vehicle::State;
+use std::io::Write;
 
 /// A motion sampled at every model step.
 #[derive(Debug, Clone)]
@@ -35,6 +36,33 @@ impl Trace {
     /// Time of PWM period `n`'s start, s.
     pub fn pwm_time_s(&self, n: usize) -> f64 {
         n as f64 * self.step_s / self.samples_per_step as f64
+    }
+
+    /// Writes the motion as CSV, one row per model step; the duty code is that of the step's last
+    /// PWM period.
+    ///
+    /// # Errors
+    /// If the writer fails.
+    pub fn write_csv(&self, to: &mut dyn Write) -> csv::Result<()> {
+        let mut csv = csv::Writer::from_writer(to);
+        csv.write_record([
+            "time_s",
+            "sideslip_rad",
+            "yaw_rate_rad_per_s",
+            "steering_angle_rad",
+            "steering_rate_rad_per_s",
+            "friction_mode",
+            "duty_code",
+        ])?;
+        let duties = self.duties.chunks(self.samples_per_step);
+        for (k, (state, duties)) in self.states.iter().zip(duties).enumerate() {
+            let mut row = vec![self.time_s(k).to_string()];
+            row.extend(state.x.iter().map(f64::to_string));
+            row.push(format!("{:?}", state.friction).to_lowercase());
+            row.push(duties.last().map_or(String::new(), u16::to_string));
+            csv.write_record(row)?;
+        }
+        Ok(csv.flush()?)
     }
 
     /// The state at the start of each step.

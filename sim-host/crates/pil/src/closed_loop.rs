@@ -34,7 +34,7 @@ pub struct Run {
 pub fn run(
     ecu: &mut dyn Ecu,
     mut vehicle: VehicleNode,
-    mut on_period: impl FnMut(),
+    on_period: &mut dyn FnMut(),
 ) -> Result<Run, RunError> {
     let mut run = Run::default();
     for _ in 0..vehicle.total_periods() {

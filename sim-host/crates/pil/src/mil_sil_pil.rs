@@ -118,16 +118,16 @@ pub fn run_all(
     scenario: &Scenario<f64>,
     manoeuvre: &Manoeuvre,
     target: &Target,
-    on_period: impl FnMut(),
+    on_period: &mut dyn FnMut(),
 ) -> Result<MilSilPil, LoopError> {
     let own = ecu_scenario(scenario, manoeuvre);
     let vehicle = || VehicleNode::new(scenario, manoeuvre);
-    let model = run(&mut Model::new(&own)?, vehicle()?, || {})?.exchanges;
+    let model = run(&mut Model::new(&own)?, vehicle()?, &mut || {})?.exchanges;
     let double = &mut Model::new(&own.map(&f64::from))?;
-    let double = run(double, vehicle()?, || {})?.exchanges;
+    let double = run(double, vehicle()?, &mut || {})?.exchanges;
     let double_precision = deviation(&model, &double);
     drop(double);
-    let software = run(&mut Software::new(&own)?, vehicle()?, || {})?.exchanges;
+    let software = run(&mut Software::new(&own)?, vehicle()?, &mut || {})?.exchanges;
     let model_software = compare(&model, &software, Depth::Commands);
     drop(model);
     let processor = on_processor(&own, vehicle()?, target, on_period)?;
@@ -150,7 +150,7 @@ pub fn on_processor(
     ecu: &Scenario<f32>,
     vehicle: VehicleNode,
     target: &Target,
-    on_period: impl FnMut(),
+    on_period: &mut dyn FnMut(),
 ) -> Result<ProcessorRun, LoopError> {
     if target.link == LinkKind::Uart {
         return on_bus(ecu, vehicle, target, on_period);
@@ -187,7 +187,7 @@ fn on_bus(
     ecu: &Scenario<f32>,
     vehicle: VehicleNode,
     target: &Target,
-    on_period: impl FnMut(),
+    on_period: &mut dyn FnMut(),
 ) -> Result<ProcessorRun, LoopError> {
     let image = configured(&target.image, ecu, target.machine.board());
     let image = image.ok_or(LoopError::NoSymbol {

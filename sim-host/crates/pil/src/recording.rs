@@ -47,7 +47,7 @@ impl Recording {
     ///
     /// # Errors
     /// If `writer` fails.
-    pub fn write(&self, writer: &mut impl Write) -> std::io::Result<()> {
+    pub fn write(&self, writer: &mut dyn Write) -> std::io::Result<()> {
         let text = toml::to_string(&self.scenario).map_err(std::io::Error::other)?;
         let mut bytes = MAGIC.to_vec();
         bytes.extend((text.len() as u32).to_le_bytes());
@@ -79,9 +79,9 @@ impl Recording {
         if periods.len() != count || rest.len() != CHECKSUM_LEN {
             return Err(Damaged);
         }
-        let scenario = toml::from_str(text);
-        let scenario: Scenario<f32> =
-            scenario.map_err(|error| RecordingError::Scenario(error.to_string()))?;
+        let scenario = dynamics::config::from_toml(text);
+        let scenario = scenario.map_err(|error| RecordingError::Scenario(error.to_string()))?;
+        let scenario = scenario.map(&|value| value as f32);
         scenario.validate()?;
         Ok(Self {
             scenario,

@@ -19,7 +19,7 @@ const TICK_S: f64 = 1e-3;
 fn drive(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Run {
     let mut ecu = Software::new(&ecu_scenario(scenario, manoeuvre)).expect("it is valid");
     let vehicle = VehicleNode::new(scenario, manoeuvre).expect("it is valid");
-    run(&mut ecu, vehicle, || {}).expect("a program on the host is reached")
+    run(&mut ecu, vehicle, &mut || {}).expect("a program on the host is reached")
 }
 
 /// The motion's period over the run's second half.
@@ -150,7 +150,7 @@ fn mil_and_sil_agree_with_any_sensors() {
         let own = ecu_scenario(&scenario, &manoeuvre);
         let drive_with = |ecu: &mut dyn Ecu| {
             let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it is valid");
-            run(ecu, vehicle, || {})
+            run(ecu, vehicle, &mut || {})
                 .expect("it is on the host")
                 .exchanges
         };

@@ -41,7 +41,7 @@ fn rows(names: &[&str], faults: &[Fault]) -> Vec<Row> {
             FaultFree::run(&scenario, &manoeuvre, &[TIME_S]).expect("it is valid")
         })
         .collect();
-    inject(&fault_free, faults, || {}).expect("it is not interrupted")
+    inject(&fault_free, faults, &|| {}).expect("it is not interrupted")
 }
 
 fn nan() -> Fault {
@@ -200,7 +200,7 @@ fn old_and_lost_frames_are_detected_at_steady_motion() {
                 "{fault} at {rpm} rpm: {faults:?}"
             );
             assert!(ticks <= latest, "{fault} at {rpm} rpm: {ticks} ticks");
-            let rows = inject(std::slice::from_ref(&fault_free), &[fault], || {});
+            let rows = inject(std::slice::from_ref(&fault_free), &[fault], &|| {});
             let rows = rows.expect("it is not interrupted");
             assert_eq!(rows[0].verdict, Verdict::Detected, "{:?}", rows[0]);
         }

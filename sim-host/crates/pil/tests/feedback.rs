@@ -23,7 +23,7 @@ fn scenario(duration_s: f64) -> Scenario<f64> {
 fn drive(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> Run {
     let mut ecu = Software::new(&ecu_scenario(scenario, manoeuvre)).unwrap();
     let vehicle = VehicleNode::new(scenario, manoeuvre).unwrap();
-    run(&mut ecu, vehicle, || {}).unwrap()
+    run(&mut ecu, vehicle, &mut || {}).unwrap()
 }
 
 fn manoeuvre(table: &str) -> Manoeuvre {

@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         &settings,
         folder.path(),
         time_out,
-        print,
+        &print,
     )?;
     println!(
         "exit code {}: {}",

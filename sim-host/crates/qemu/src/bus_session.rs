@@ -349,7 +349,7 @@ impl BusSession {
             let bytes = channel.take(&mut self.gdb)?;
             let log = &mut self.log;
             self.decoder
-                .decode_some(&mut self.stream, &bytes, |line| log.push(line));
+                .decode_some(&mut self.stream, &bytes, &mut |line| log.push(line));
         }
         Ok(())
     }

@@ -59,6 +59,6 @@ impl Debugged {
     /// As [`run::run`].
     pub fn finish(self, limit: Duration) -> Result<Finished, RunError> {
         self.gdb.detach()?;
-        run::attend(self.emulator, &self.decoder, limit, |_| {})
+        run::attend(self.emulator, &self.decoder, limit, &|_| {})
     }
 }

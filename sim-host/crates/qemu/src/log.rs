@@ -62,11 +62,11 @@ impl LogDecoder {
 
     /// Reads the console to its end; `on_line` is called with each line of the log, if it is
     /// readable.
-    pub fn decode(&self, mut console: impl std::io::Read, mut on_line: impl FnMut(&str)) {
+    pub fn decode(&self, console: &mut dyn std::io::Read, on_line: &mut dyn FnMut(&str)) {
         let mut buffer = [0; 4096];
         let mut stream = Stream::default();
         while let Ok(length @ 1..) = console.read(&mut buffer) {
-            self.decode_some(&mut stream, &buffer[..length], &mut on_line);
+            self.decode_some(&mut stream, &buffer[..length], on_line);
         }
     }
 
@@ -75,7 +75,7 @@ impl LogDecoder {
         &self,
         stream: &mut Stream,
         bytes: &[u8],
-        mut on_line: impl FnMut(&str),
+        on_line: &mut dyn FnMut(&str),
     ) {
         let Some(table) = &self.table else { return };
         let Stream { frame, is_too_long } = stream;
@@ -87,7 +87,7 @@ impl LogDecoder {
             if piece.ends_with(&[0]) {
                 match std::mem::take(is_too_long) {
                     true => on_line(DAMAGED),
-                    false => decode_frame(table, frame, &mut on_line),
+                    false => decode_frame(table, frame, on_line),
                 }
                 frame.clear();
             }
@@ -103,7 +103,7 @@ pub(crate) struct Stream {
 }
 
 /// A frame with its terminating zero; consecutive zeros end one frame.
-fn decode_frame(table: &Table, frame: &[u8], on_line: &mut impl FnMut(&str)) {
+fn decode_frame(table: &Table, frame: &[u8], on_line: &mut dyn FnMut(&str)) {
     // A frame for other symbols can make the crate panic.
     let line = catch_unwind(AssertUnwindSafe(|| {
         let mut decoder = table.new_stream_decoder();

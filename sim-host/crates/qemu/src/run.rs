@@ -146,7 +146,7 @@ pub fn run(
     settings: &[String],
     directory: &Path,
     limit: Duration,
-    on_line: impl Fn(&str) + Sync,
+    on_line: &(dyn Fn(&str) + Sync),
 ) -> Result<Finished, RunError> {
     let decoder = LogDecoder::new(image)?;
     if !decoder.is_readable() {
@@ -168,7 +168,7 @@ pub fn run_with(
     settings: &[String],
     directory: &Path,
     limit: Duration,
-    on_line: impl Fn(&str) + Sync,
+    on_line: &(dyn Fn(&str) + Sync),
 ) -> Result<Finished, RunError> {
     let emulator = start(image, machine, settings, directory, SILENT)?;
     attend(emulator, decoder, limit, on_line)
@@ -179,14 +179,14 @@ pub(crate) fn attend(
     mut emulator: Emulator,
     decoder: &LogDecoder,
     limit: Duration,
-    on_line: impl Fn(&str) + Sync,
+    on_line: &(dyn Fn(&str) + Sync),
 ) -> Result<Finished, RunError> {
-    let console = emulator.output();
+    let mut console = emulator.output();
     let errors = emulator.errors();
     thread::scope(|scope| {
         let log = scope.spawn(|| {
             let mut lines = Lines::default();
-            decoder.decode(console, |line| {
+            decoder.decode(&mut console, &mut |line| {
                 on_line(line);
                 lines.push(line);
             });

@@ -110,12 +110,12 @@ struct Attended {
 
 impl Attended {
     fn new(mut emulator: Emulator, decoder: LogDecoder) -> Self {
-        let (console, errors) = (emulator.output(), emulator.errors());
+        let (mut console, errors) = (emulator.output(), emulator.errors());
         let last_line = Arc::new(Mutex::new(String::from("(none)")));
         let seen = Arc::clone(&last_line);
         let log = thread::spawn(move || {
             let mut lines = Lines::default();
-            decoder.decode(console, |line| {
+            decoder.decode(&mut console, &mut |line| {
                 *seen.lock().expect("no thread panics while it is locked") = line.to_owned();
                 lines.push(line);
             });

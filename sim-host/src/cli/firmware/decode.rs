@@ -2,8 +2,8 @@
 
 use crate::cli::outcome::Outcome;
 use crate::cli::output::{check, named};
-use crate::cli::simulate;
 use dynamics::words::counted;
+use files::output;
 use pil::equivalence::trace_of;
 use qemu::meaning;
 use qemu::telemetry::Recording;
@@ -45,7 +45,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         trailer.neutral_duty,
     );
     if let Some(out) = &arguments.out {
-        simulate::write(&trace_of(&recording), out, arguments.force)?;
+        let trace = trace_of(&recording);
+        output::write(out, arguments.force, |to| Ok(trace.write_csv(to)?))?;
     }
     Ok(Outcome::Success)
 }

@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     }
     check_destination(arguments)?;
     let before = telemetry(arguments).and_then(written);
-    let show = |line: &str| say!("{line}");
+    let show = &|line: &str| say!("{line}");
     let finished = qemu::run_with(
         &decoder,
         &image,

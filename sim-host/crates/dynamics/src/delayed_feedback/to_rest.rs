@@ -97,10 +97,10 @@ fn left_eigenvector(
 ) -> Option<Vector4<Complex<f64>>> {
     let shifted = matrix.transpose().map(Complex::from)
         - Matrix4::from_diagonal_element(eigenvalue * (1.0 + SHIFT));
-    let inverse = shifted.try_inverse()?;
+    let factors = shifted.lu();
     let mut left = Vector4::new(1.0, -0.7, 0.5, 0.3).map(Complex::from);
     for _ in 0..ITERATIONS {
-        left = (inverse * left).normalize();
+        left = factors.solve(&left)?.normalize();
     }
     Some(left)
 }

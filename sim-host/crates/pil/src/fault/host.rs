@@ -151,7 +151,7 @@ impl FaultFree {
 pub fn inject(
     manoeuvres: &[FaultFree],
     faults: &[Fault],
-    on_run: impl Fn() + Sync,
+    on_run: &(dyn Fn() + Sync),
 ) -> Result<Vec<Row>, RunError> {
     let saved = manoeuvres.iter().flat_map(|fault_free| {
         fault_free
