@@ -5,6 +5,12 @@
 use autosar_e2e::profile5::{Profile5, Profile5Config};
 use autosar_e2e::{E2EProfile, E2EStatus};
 use fastrand::Rng;
+use pil::can_log::{Format, write};
+use pil::closed_loop::run;
+use pil::ecu::Software;
+use pil::manoeuvre::Manoeuvre;
+use pil::vehicle_node::{VehicleNode, ecu_scenario};
+use shared_model::Scenario;
 use shared_model::bus::Message;
 use shared_model::diagnostic::{
     DIAGNOSTIC_DATA_ID, Diagnostic, Record, ResetCause, encode_diagnostic,
@@ -513,5 +519,50 @@ fn the_dbc_names_every_bit_of_faults_and_warnings() {
     let warnings = Warning::ALL.map(|warning| format!("{} {}", warning as u8, warning.name()));
     for bits in [faults.join(", "), warnings.join(", ")] {
         assert!(text.contains(&format!("one bit each: {bits}.\"")), "{bits}");
+    }
+}
+
+/// python-can reads both formats of a log, with every frame of a drive, its time and its bits.
+#[test]
+fn logs_are_read_by_python_can() {
+    let mut scenario = Scenario::reconstruction();
+    scenario.run.duration_s = 0.5;
+    let manoeuvre = Manoeuvre::constant(1750.0, 10.0);
+    let vehicle = VehicleNode::new(&scenario, &manoeuvre).expect("it can be driven");
+    let mut ecu = Software::new(&ecu_scenario(&scenario, &manoeuvre)).expect("it is valid");
+    let run = run(&mut ecu, vehicle, &mut || {}).expect("a program on the host is reached");
+    let mut expected = Vec::new();
+    for (period, exchange) in run.exchanges.iter().enumerate() {
+        let frames = [
+            (period, ACTUATOR.0, 11, exchange.from_ecu.frame),
+            (period + 1, SENSOR.0, 8, exchange.to_ecu.frame),
+        ];
+        for (period, name, signals, frame) in frames {
+            let line =
+                |frame| format!("{} {name} fd whole {signals} {}", 100 * period, hex(&frame));
+            expected.extend(frame.map(line));
+        }
+    }
+    assert!(expected.len() > 2000);
+
+    let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = tempfile::tempdir().expect("a temporary folder can be made");
+    for name in ["drive.log", "drive.asc"] {
+        let path = folder.path().join(name);
+        let mut file = fs::File::create(&path).expect("a file can be made");
+        let format = Format::of(&path);
+        write(&run.exchanges, scenario.run.pwm_rate_hz, format, &mut file).expect("it is written");
+        let output = Command::new(python())
+            .arg("-I")
+            .arg(tests.join("python/check_log.py"))
+            .arg(tests.with_file_name("docs").join("dithersteer.dbc"))
+            .arg(&path)
+            .output()
+            .expect("Python starts");
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{name}: {message}");
+        let read = String::from_utf8_lossy(&output.stdout);
+        let read: Vec<&str> = read.lines().collect();
+        assert_eq!(read, expected, "{name}");
     }
 }

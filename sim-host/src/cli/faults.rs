@@ -1,6 +1,7 @@
 //! `sim-host faults`: the fault campaign.
 
 use super::emulator::open_image;
+use super::firmware::find;
 use super::options::time_out;
 use super::outcome::Outcome;
 use super::output::{Destinations, named};
@@ -44,9 +45,11 @@ pub struct Arguments {
     /// Inject at one time per manoeuvre, and flip few bits
     #[arg(long)]
     quick: bool,
-    /// Firmware image (ELF) for the faults of memory and core; they are omitted without it
-    #[arg(long, value_name = "ELF")]
-    firmware: Option<PathBuf>,
+    /// Firmware image (ELF) for the faults of memory and core, which are omitted without it; without
+    /// a path `bench` in the folder DITHERSTEER_FIRMWARE, in `firmware` beside this program, or in
+    /// target/
+    #[arg(long, value_name = "ELF", num_args = 0..=1)]
+    firmware: Option<Option<PathBuf>>,
     /// Time without an answer after which the ECU has stopped sending, s; an answer takes milliseconds
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     time_out: f64,
@@ -61,11 +64,17 @@ struct Results<'a> {
 }
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
-    let firmware = named("--firmware", &arguments.firmware);
-    arguments.destinations.check(firmware)?;
+    let firmware = match &arguments.firmware {
+        Some(None) => Some(find::image("bench")?),
+        Some(Some(path)) => Some(path.clone()),
+        None => None,
+    };
+    arguments
+        .destinations
+        .check(named("--firmware", &firmware))?;
     let limit = time_out(arguments.time_out)?;
     // Before the campaign on the host, which takes minutes.
-    let image = arguments.firmware.as_deref().map(open_image).transpose()?;
+    let image = firmware.as_deref().map(open_image).transpose()?;
     let mut rows = on_host(arguments.quick)?;
     match image {
         Some(image) => rows.extend(processor::inject(image, arguments.quick, limit)?),

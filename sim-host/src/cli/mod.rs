@@ -26,6 +26,7 @@ mod outcome;
 mod output;
 mod phase;
 mod pil;
+mod pil_replay;
 mod poincare;
 mod realisability;
 mod regions;

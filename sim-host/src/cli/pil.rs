@@ -1,21 +1,22 @@
 //! `sim-host pil`: manoeuvres with the ECU in the loop.
 
 use super::emulator::{link_kinds, machines, open_image};
+use super::firmware::find;
 use super::options::{time_out, waveform};
 use super::outcome::Outcome;
 use super::output::{Destinations, check, named};
+use super::pil_replay;
 use anyhow::{Context, ensure};
 use dynamics::config::validate;
-use dynamics::words::{counted, counted_as};
-use files::input;
 use files::output::{self, write_json, write_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
-use pil::comparison::{Comparison, Depth, compare};
+use pil::can_log;
+use pil::comparison::Comparison;
 use pil::figure::draw;
 use pil::manoeuvre::{self, Manoeuvre};
 use pil::mil_sil_pil::{MilSilPil, Target, run_all};
 use pil::profile::Profile;
-use pil::recording::{MAGIC, Recording};
+use pil::recording::Recording;
 use pil::vehicle_node::ecu_scenario;
 use qemu::Machine;
 use qemu::session::LinkKind;
@@ -41,6 +42,8 @@ use std::path::{Path, PathBuf};
   sim-host pil --scenario examples/manoeuvres/speed-ramp.toml \\
       --record ramp.loop --out ramp.csv
   sim-host pil --replay ramp.loop       # the recorded run, without QEMU
+  sim-host pil --can-log drive.log      # its frames, as candump writes them
+  sim-host pil --replay drive.log --out drive.csv       # the ECU fed with them
   sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
   sim-host pil --link uart --time 5     # the image `ecu`, over its UART")]
 pub struct Arguments {
@@ -63,15 +66,20 @@ pub struct Arguments {
     /// Machine to emulate
     #[arg(long, value_parser = machines(), default_value = "mps2-an386")]
     machine: Machine,
-    /// Firmware image (ELF) [default: target/thumbv7em-none-eabihf/firmware/bench, or `ecu` there
-    /// for the link uart]
+    /// Firmware image (ELF) [default: `bench`, or `ecu` for the link uart, in the folder
+    /// DITHERSTEER_FIRMWARE, in `firmware` beside this program, or in target/]
     #[arg(long, value_name = "ELF")]
     firmware: Option<PathBuf>,
     /// Record the exchange between firmware and vehicle
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Replay a recorded run without QEMU, and compare
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["scenario", "rpm", "dither", "time", "record", "out", "json", "figure"])]
+    /// Write the frames of both directions as a log of the bus: ASC for a name in .asc, else that of
+    /// candump; docs/dithersteer.dbc names the signals
+    #[arg(long, value_name = "FILE")]
+    can_log: Option<PathBuf>,
+    /// Replay a recorded run without QEMU, and compare; or feed the ECU's program with the sensor
+    /// frames of a bus log (candump or ASC), with the configuration of --scenario
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["rpm", "dither", "time", "record", "can_log", "json", "figure"])]
     replay: Option<PathBuf>,
     #[command(flatten)]
     files: Destinations,
@@ -84,13 +92,14 @@ const USUAL: &str = include_str!("../../examples/manoeuvres/constant-speed.toml"
 
 pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     if let Some(file) = &arguments.replay {
-        return replay(file);
+        return arguments.replay(file);
     }
     let time_out = time_out(arguments.time_out)?;
     let manoeuvres = arguments.manoeuvres()?;
-    arguments.check_outputs(manoeuvres.len())?;
+    let firmware = arguments.firmware();
+    arguments.check_outputs(manoeuvres.len(), firmware.as_deref().ok())?;
     let target = Target {
-        image: open_image(&arguments.firmware())?,
+        image: open_image(&firmware?)?,
         machine: arguments.machine,
         link: arguments.link,
         time_out,
@@ -126,13 +135,12 @@ fn keep_to_one_core() {
 }
 
 impl Arguments {
-    fn firmware(&self) -> PathBuf {
-        let name = match self.link {
-            LinkKind::Uart => "ecu",
-            _ => "bench",
-        };
-        let usual = Path::new("target/thumbv7em-none-eabihf/firmware").join(name);
-        self.firmware.clone().unwrap_or(usual)
+    fn firmware(&self) -> anyhow::Result<PathBuf> {
+        match (&self.firmware, self.link) {
+            (Some(firmware), _) => Ok(firmware.clone()),
+            (None, LinkKind::Uart) => find::image("ecu"),
+            (None, _) => find::image("bench"),
+        }
     }
 
     fn manoeuvres(&self) -> anyhow::Result<Vec<(Scenario<f64>, Manoeuvre)>> {
@@ -148,6 +156,36 @@ impl Arguments {
             self.adapt(scenario, manoeuvre)?;
         }
         Ok(manoeuvres)
+    }
+
+    fn replay(&self, file: &Path) -> anyhow::Result<Outcome> {
+        if pil_replay::is_recording(file)? {
+            ensure!(
+                self.scenario.is_empty() && self.files.out.is_none(),
+                "{} is a recorded run, which has its configuration: --scenario and --out are for a bus log",
+                file.display()
+            );
+            return pil_replay::recording(file);
+        }
+        ensure!(
+            self.scenario.len() < 2,
+            "--replay with {} scenarios: must be one",
+            self.scenario.len()
+        );
+        let manoeuvres = self.manoeuvres()?;
+        let (scenario, manoeuvre) = &manoeuvres[0];
+        let inputs = [("--replay", file)];
+        let scenarios = self
+            .scenario
+            .iter()
+            .map(|file| ("--scenario", file.as_path()));
+        check(
+            inputs.into_iter().chain(scenarios),
+            [named("--out", &self.files.out)],
+            self.files.force,
+        )?;
+        let ecu = ecu_scenario(scenario, manoeuvre);
+        pil_replay::log(file, &ecu, self.files.out.as_deref(), self.files.force)
     }
 
     fn adapt(&self, scenario: &mut Scenario<f64>, manoeuvre: &mut Manoeuvre) -> anyhow::Result<()> {
@@ -166,9 +204,15 @@ impl Arguments {
     }
 
     /// Rejects invalid outputs before the work begins.
-    fn check_outputs(&self, manoeuvres: usize) -> anyhow::Result<()> {
+    fn check_outputs(&self, manoeuvres: usize, firmware: Option<&Path>) -> anyhow::Result<()> {
         let [out, json, figure] = self.files.files();
-        let of_one = [named("--record", &self.record), out, figure];
+        let (record, can_log) = (&self.record, &self.can_log);
+        let of_one = [
+            named("--record", record),
+            named("--can-log", can_log),
+            out,
+            figure,
+        ];
         for (option, _) in of_one.into_iter().flatten() {
             ensure!(
                 manoeuvres == 1,
@@ -176,11 +220,10 @@ impl Arguments {
             );
         }
         let scenarios = self.scenario.iter();
-        let firmware = self.firmware();
-        let firmware = ("--firmware", firmware.as_path());
+        let firmware = firmware.map(|firmware| ("--firmware", firmware));
         let inputs = scenarios.map(|file| ("--scenario", file.as_path()));
         let files = of_one.into_iter().chain([json]);
-        check(inputs.chain([firmware]), files, self.files.force).map(drop)
+        check(inputs.chain(firmware), files, self.files.force).map(drop)
     }
 
     fn write(
@@ -196,6 +239,12 @@ impl Arguments {
                 exchanges: run.exchanges.clone(),
             };
             output::write(path, self.files.force, |to| Ok(recording.write(to)?))?;
+        }
+        if let Some(path) = &self.can_log {
+            let (format, rate_hz) = (can_log::Format::of(path), scenario.run.pwm_rate_hz);
+            output::write(path, self.files.force, |to| {
+                Ok(can_log::write(&run.exchanges, rate_hz, format, to)?)
+            })?;
         }
         if let Some(path) = &self.files.out {
             write_rows(path, &run.records, self.files.force)?;
@@ -284,8 +333,8 @@ fn show(summaries: &[Summary], link: LinkKind) {
             summary.manoeuvre,
             summary.simulated_s,
             summary.software_processor.duties,
-            words(&summary.model_software),
-            words(&summary.software_processor),
+            summary.model_software,
+            summary.software_processor,
             double,
             summary.times_real_time
         );
@@ -312,36 +361,4 @@ fn show(summaries: &[Summary], link: LinkKind) {
                 "the image `ecu` over its UART; the board's timers are the clock, the debugger stops them while the vehicle answers",
         }
     );
-}
-
-fn words(comparison: &Comparison) -> String {
-    if comparison.is_equal() {
-        return "equal".into();
-    }
-    let different = comparison.different_duties + comparison.different_frames;
-    match comparison.first {
-        Some(period) => format!("{different} from {period}"),
-        None => format!("{} missing", comparison.unmatched),
-    }
-}
-
-fn replay(file: &Path) -> anyhow::Result<Outcome> {
-    let name = file.display();
-    let is_start = |start: &[u8]| start.starts_with(MAGIC);
-    let bytes = input::read(file, input::RECORDING_BYTES, is_start)
-        .with_context(|| format!("cannot read {name}"))?;
-    let recording = Recording::read(&bytes).with_context(|| name.to_string())?;
-    let replayed = recording.replay().with_context(|| name.to_string())?;
-    let comparison = compare(&recording.exchanges, &replayed, Depth::Bytes);
-    say!(
-        "{} and {} replayed: {}",
-        counted_as(comparison.duties, "duty", "duties"),
-        counted(comparison.frames, "actuator frame"),
-        words(&comparison)
-    );
-    Ok(if comparison.is_equal() {
-        Outcome::Success
-    } else {
-        Outcome::Failed
-    })
 }

@@ -1,6 +1,7 @@
 //! `sim-host verify`: verification of the firmware.
 
 use super::emulator::open_image;
+use super::firmware::find;
 use super::options::{ConfigOptions, time_out};
 use super::outcome::Outcome;
 use super::output::check;
@@ -33,13 +34,10 @@ use std::time::{Duration, Instant};
 pub struct Arguments {
     #[command(flatten)]
     config: ConfigOptions,
-    /// Firmware image (ELF)
-    #[arg(
-        long,
-        value_name = "ELF",
-        default_value = "target/thumbv7em-none-eabihf/firmware/bench"
-    )]
-    firmware: PathBuf,
+    /// Firmware image (ELF) [default: `bench` in the folder DITHERSTEER_FIRMWARE, in `firmware`
+    /// beside this program, or in target/]
+    #[arg(long, value_name = "ELF")]
+    firmware: Option<PathBuf>,
     /// Folder with the recorded proofs, for the report
     #[arg(long, value_name = "FOLDER", default_value = "tests/golden")]
     proofs: PathBuf,
@@ -71,13 +69,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     );
     let base = arguments.config.load()?;
     validate(&base)?;
+    let firmware = match &arguments.firmware {
+        Some(firmware) => firmware.clone(),
+        None => find::image("bench")?,
+    };
     let options = Options {
         time_out: time_out(arguments.time_out)?,
-        image: open_image(&arguments.firmware)?,
+        image: open_image(&firmware)?,
         base,
         duration_s,
     };
-    arguments.check_outputs()?;
+    arguments.check_outputs(&firmware)?;
     make_folder(&arguments.out)?;
 
     let start = Instant::now();
@@ -94,8 +96,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
 
 impl Arguments {
     /// A report exists if one of its files exists.
-    fn check_outputs(&self) -> anyhow::Result<()> {
-        let inputs = [("--firmware", self.firmware.as_path())];
+    fn check_outputs(&self, firmware: &Path) -> anyhow::Result<()> {
+        let inputs = [("--firmware", firmware)];
         let mut outputs = check(
             inputs.into_iter().chain(self.config.input()),
             [],

@@ -3,6 +3,7 @@
 use super::closed_loop::Exchange;
 use shared_model::exchange::Packet;
 use shared_model::frame::decode_actuation;
+use std::fmt;
 
 /// Differences between two runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -19,6 +20,17 @@ pub struct Comparison {
     pub first: Option<usize>,
     /// PWM periods that only one of the runs has.
     pub unmatched: usize,
+}
+
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let different = self.different_duties + self.different_frames;
+        f.pad(&match self.first {
+            _ if self.is_equal() => "equal".into(),
+            Some(period) => format!("{different} from {period}"),
+            None => format!("{} missing", self.unmatched),
+        })
+    }
 }
 
 impl Comparison {

@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+pub mod can_log;
 pub mod closed_loop;
 pub mod comparison;
 pub mod disturbance;

@@ -2,6 +2,7 @@
 
 pub mod configure;
 pub mod decode;
+pub mod find;
 pub mod image;
 pub mod run;
 

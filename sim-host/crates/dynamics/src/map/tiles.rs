@@ -106,19 +106,26 @@ pub enum InvalidTile {
     OtherTile(usize),
 }
 
-/// Every `of`-th tile of a map: what one of several machines makes.
+/// A share of a map's tiles: what one of several machines makes. All shares cost about the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     index: usize,
     of: usize,
 }
 
+/// Its fraction, in units of 2^-64.
+const GOLDEN_RATIO: u64 = 0x9E37_79B9_7F4A_7C15;
+
 impl Shard {
     /// All tiles.
     pub const ALL: Self = Self { index: 1, of: 1 };
 
+    /// By the fraction of the tile's number times the golden ratio, which spreads over the shards
+    /// every sequence of tiles: neighbours cost alike, and so do the tiles at one place in all rows.
     fn holds(self, tile: usize) -> bool {
-        tile % self.of == self.index - 1
+        let fraction = (tile as u64).wrapping_mul(GOLDEN_RATIO);
+        let shard = (u128::from(fraction) * self.of as u128) >> 64;
+        shard as usize == self.index - 1
     }
 }
 
@@ -342,4 +349,45 @@ fn first_tile(path: &Path) -> Result<Option<PathBuf>, TilesError> {
         name.starts_with("tile-") && name.ends_with(".csv")
     };
     Ok(files.into_iter().filter(is_tile).min())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shards(of: usize) -> Vec<Shard> {
+        (1..=of).map(|index| Shard { index, of }).collect()
+    }
+
+    #[test]
+    fn each_tile_is_in_one_shard() {
+        for of in 1..=9 {
+            for tile in 0..1000 {
+                let holders = shards(of).into_iter().filter(|shard| shard.holds(tile));
+                assert_eq!(holders.count(), 1, "tile {tile} of {of} shards");
+            }
+        }
+    }
+
+    /// Of tiles that cost as much as their place in a row says, each shard gets a like share,
+    /// whatever the length of a row.
+    #[test]
+    fn shards_cost_alike() {
+        const ROWS: usize = 512;
+        for row in [1, 2, 3, 4, 6, 8, 16] {
+            for of in 2..=8 {
+                let cost = |tile: usize| (1 + tile % row * 10) as f64;
+                let all = 0..ROWS * row;
+                let fair = all.clone().map(cost).sum::<f64>() / of as f64;
+                for shard in shards(of) {
+                    let own = all.clone().filter(|&tile| shard.holds(tile));
+                    let own = own.map(cost).sum::<f64>() / fair;
+                    assert!(
+                        (0.97..1.03).contains(&own),
+                        "{shard:?}, rows of {row}: {own}"
+                    );
+                }
+            }
+        }
+    }
 }
