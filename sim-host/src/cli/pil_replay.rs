@@ -87,7 +87,10 @@ pub fn log(
     };
     // The log's own fault is the reason, not that nothing was written.
     if let Some(Err(error)) = replayed {
-        return Err(error).with_context(|| file.display().to_string());
+        let name = file.display();
+        return Err(error).with_context(|| {
+            format!("{name} is not a recording, and cannot be read as a bus log")
+        });
     }
     written?;
     if let Some(Ok(summary)) = replayed {

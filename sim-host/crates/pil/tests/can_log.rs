@@ -216,7 +216,7 @@ fn a_long_log_is_read_as_it_comes() {
         let frame = reader
             .next_frame()
             .expect("it is whole")
-            .expect("it goes on");
+            .expect("it continues");
         assert_eq!(frame.time_s, f64::from(k));
     }
     assert_eq!(reader.line(), 100_000);

@@ -81,7 +81,7 @@ pub fn write(
                     frame
                         .iter()
                         .try_for_each(|byte| write!(to, " {byte:02x}"))?;
-                    // Duration, length and flags (FD, bit rate switched); check sum and bit timing
+                    // Duration, length and flags (FD, bit rate switched); checksum and bit timing
                     // are not known.
                     write!(to, " {:>8} {:>4} {:>8X} 0 0 0 0 0", 0, 0, 0x3000)?;
                 }

@@ -114,8 +114,8 @@ pub struct Summary {
 /// `on_tick`, which is called with each control tick, returns false. A sensor frame comes in the
 /// tick to which its time is nearest, counted from the first.
 ///
-/// A vehicle answers the challenges of its own ECU; so the answer in each whole sensor frame is put
-/// right for this one, and the check sum with it.
+/// A vehicle answers the challenges of the ECU in it; so the answer in each whole sensor frame is put
+/// right for this one, and the checksum with it.
 ///
 /// # Errors
 /// If the log cannot be read, has no sensor frame, a gap of over 60 s or a time that goes back, or
