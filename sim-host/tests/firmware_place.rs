@@ -2,10 +2,17 @@
 
 mod common;
 
-use common::{assert_ends, folder};
+use common::{assert_ends, assert_refused, folder};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+
+#[test]
+fn an_image_that_the_option_names_must_be_there() {
+    let place = folder();
+    let arguments = ["pil", "--firmware", "missing.elf"];
+    assert_refused(place.path(), arguments, &["missing.elf", "No such file"]);
+}
 
 /// A copy of the program in `place/bin`, as if it were installed there.
 fn installed(place: &Path) -> Command {

@@ -464,8 +464,5 @@ pub(crate) fn side_by_side<R: Send + Sync>(
 
 /// Compiled once: rayon's own collection is some 2000 lines of code for every kind of result.
 fn on_all_threads(count: usize, work: &(dyn Fn(usize) + Sync)) {
-    (0..count)
-        .into_par_iter()
-        .with_max_len(1)
-        .for_each(|k| work(k));
+    (0..count).into_par_iter().with_max_len(1).for_each(work);
 }

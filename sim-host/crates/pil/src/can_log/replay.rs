@@ -129,10 +129,7 @@ pub fn replay(
     let mut ecu = Replayed::new(scenario)?;
     let mut first_and_last_s = None;
     let mut now = Received::default();
-    loop {
-        let Some(frame) = log.next_frame()? else {
-            break;
-        };
+    while let Some(frame) = log.next_frame()? {
         let Some((message, bytes)) = known(&frame) else {
             ecu.summary.foreign += 1;
             continue;
