@@ -71,7 +71,6 @@ fn every_link_leads_somewhere() {
     assert!(checked > 20, "the texts have more links than {checked}");
 }
 
-/// A chapter that is not in the table of contents is not in the book.
 /// A command with `-p PACKAGE --example NAME` finds the example in one of the crates.
 #[test]
 fn every_example_that_is_named_is_there() {
@@ -95,6 +94,7 @@ fn every_example_that_is_named_is_there() {
     assert!(named >= 3, "{named} examples");
 }
 
+/// A chapter that is not in the table of contents is not in the book.
 #[test]
 fn every_chapter_is_in_the_book() {
     let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("it is there");

@@ -159,13 +159,14 @@ impl Arguments {
     }
 
     fn replay(&self, file: &Path) -> anyhow::Result<Outcome> {
-        if pil_replay::is_recording(file)? {
+        let input = pil_replay::open(file)?;
+        if input.is_recording {
             ensure!(
                 self.scenario.is_empty() && self.files.out.is_none(),
                 "{} is a recorded run, which has its configuration: --scenario and --out are for a bus log",
                 file.display()
             );
-            return pil_replay::recording(file);
+            return pil_replay::recording(file, input);
         }
         ensure!(
             self.scenario.len() < 2,
@@ -185,7 +186,13 @@ impl Arguments {
             self.files.force,
         )?;
         let ecu = ecu_scenario(scenario, manoeuvre);
-        pil_replay::log(file, &ecu, self.files.out.as_deref(), self.files.force)
+        pil_replay::log(
+            file,
+            input,
+            &ecu,
+            self.files.out.as_deref(),
+            self.files.force,
+        )
     }
 
     fn adapt(&self, scenario: &mut Scenario<f64>, manoeuvre: &mut Manoeuvre) -> anyhow::Result<()> {

@@ -10,27 +10,38 @@ use pil::recording::{MAGIC, Recording};
 use shared_model::Scenario;
 use shared_model::gate::Faults;
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Chain, Cursor, Read};
 use std::path::Path;
 
 /// Changes of mode that are listed on the terminal.
 const MAX_LISTED: usize = 20;
 
-/// Whether a file is a recorded run; else it is taken for a bus log.
-pub fn is_recording(file: &Path) -> anyhow::Result<bool> {
+/// A file to be replayed, from its beginning.
+pub struct Input {
+    /// Whether it is a recorded run; else it is taken for a bus log.
+    pub is_recording: bool,
+    bytes: Chain<Cursor<Vec<u8>>, File>,
+}
+
+/// Opens a file, once: it may be a pipe.
+pub fn open(file: &Path) -> anyhow::Result<Input> {
     let unreadable = || format!("cannot read {}", file.display());
+    let mut opened = File::open(file).with_context(unreadable)?;
     let mut start = Vec::new();
-    File::open(file)
-        .and_then(|opened| opened.take(MAGIC.len() as u64).read_to_end(&mut start))
+    (&mut opened)
+        .take(MAGIC.len() as u64)
+        .read_to_end(&mut start)
         .with_context(unreadable)?;
-    Ok(start == MAGIC)
+    Ok(Input {
+        is_recording: start == MAGIC,
+        bytes: Cursor::new(start).chain(opened),
+    })
 }
 
 /// Replays a recorded run, and compares the duties and frames.
-pub fn recording(file: &Path) -> anyhow::Result<Outcome> {
+pub fn recording(file: &Path, input: Input) -> anyhow::Result<Outcome> {
     let name = file.display();
-    let is_start = |start: &[u8]| start.starts_with(MAGIC);
-    let bytes = input::read(file, input::RECORDING_BYTES, is_start)
+    let bytes = input::read_rest(input.bytes, input::RECORDING_BYTES)
         .with_context(|| format!("cannot read {name}"))?;
     let recording = Recording::read(&bytes).with_context(|| name.to_string())?;
     let replayed = recording.replay().with_context(|| name.to_string())?;
@@ -52,12 +63,12 @@ pub fn recording(file: &Path) -> anyhow::Result<Outcome> {
 /// control tick as CSV.
 pub fn log(
     file: &Path,
+    input: Input,
     ecu: &Scenario<f32>,
     out: Option<&Path>,
     force: bool,
 ) -> anyhow::Result<Outcome> {
-    let opened = File::open(file).with_context(|| format!("cannot read {}", file.display()))?;
-    let mut reader = Reader::new(BufReader::new(opened));
+    let mut reader = Reader::new(BufReader::new(input.bytes));
     let mut modes = Modes::default();
     let mut replayed = None;
     let mut run = |on_row: &mut dyn FnMut(&Row) -> bool| {
@@ -123,7 +134,7 @@ impl Modes {
 
 fn show(summary: &Summary, modes: &Modes) {
     say!(
-        "{}, {}: {} damaged, {} replaced by another in the same tick; {} of others",
+        "{}, {}: {} damaged, {} replaced by another in the same tick; {} of other kinds",
         counted(summary.ticks, "control tick"),
         counted(summary.sensor_frames, "sensor frame"),
         summary.damaged,

@@ -37,6 +37,20 @@ pub fn read(path: &Path, most: u64, is_start: impl Fn(&[u8]) -> bool) -> io::Res
     Ok(bytes)
 }
 
+/// Reads at most `most` bytes of what is open already.
+///
+/// # Errors
+/// If it cannot be read, or is longer.
+pub fn read_rest(source: impl Read, most: u64) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    // One byte more than allowed, because the length of a pipe or a device is unknown.
+    source.take(most + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most {
+        return Err(too_long(most));
+    }
+    Ok(bytes)
+}
+
 /// Reads a text of at most `most` bytes.
 ///
 /// # Errors

@@ -62,6 +62,7 @@ impl<R: BufRead> Reader<R> {
     pub fn next_frame(&mut self) -> Result<Option<Frame>, LogError> {
         let mut bytes = Vec::new();
         loop {
+            interrupt::check();
             bytes.clear();
             self.line += 1;
             let mut limited = std::io::Read::take(&mut self.source, LONGEST_LINE);
