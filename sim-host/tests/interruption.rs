@@ -89,3 +89,29 @@ fn sigterm_ends_every_long_job() {
         );
     }
 }
+
+/// A log without a sensor frame from a pipe that never ends, and one of empty lines.
+#[test]
+fn sigterm_ends_the_replay_of_an_endless_log() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("pipe.log");
+    let made = Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.expect("mkfifo starts").success());
+    for line in ["(1.0) can0 7DF#00", ""] {
+        let mut writer = Command::new("sh")
+            .args(["-c", "exec yes \"$1\" > pipe.log", "sh", line])
+            .current_dir(folder.path())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("a shell");
+        let arguments = ["pil", "--replay", "pipe.log", "--out", "o.csv"];
+        let (code, message) = end(start(&arguments, folder.path()));
+        writer.wait().expect("it ends with the pipe");
+        assert_eq!(
+            (code, message.as_str()),
+            (Some(2), "error: interrupted"),
+            "{line:?}"
+        );
+        assert!(!folder.path().join("o.csv").exists());
+    }
+}
