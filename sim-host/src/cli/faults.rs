@@ -4,12 +4,14 @@ use super::emulator::open_image;
 use super::firmware::find;
 use super::options::time_out;
 use super::outcome::Outcome;
-use super::output::{Destinations, named};
+use super::output::{Destinations, check, named};
 use clap::Args;
 use dynamics::words::counted;
+use files::output::write_text;
 use indicatif::{ProgressBar, ProgressStyle};
 use pil::fault::catalogue::{self, Class};
 use pil::fault::figure::draw;
+use pil::fault::fmea;
 use pil::fault::host::{self, FaultFree};
 use pil::fault::manoeuvres;
 use pil::fault::row::Row;
@@ -50,6 +52,9 @@ pub struct Arguments {
     /// target/
     #[arg(long, value_name = "ELF", num_args = 0..=1)]
     firmware: Option<Option<PathBuf>>,
+    /// Write the failure modes, their effects and their detection (FMEA) as a table in Markdown
+    #[arg(long, value_name = "FILE")]
+    fmea: Option<PathBuf>,
     /// Time without an answer after which the ECU has stopped sending, s; an answer takes milliseconds
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0)]
     time_out: f64,
@@ -69,9 +74,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         Some(Some(path)) => Some(path.clone()),
         None => None,
     };
-    arguments
-        .destinations
-        .check(named("--firmware", &firmware))?;
+    let destinations = &arguments.destinations;
+    let fmea = named("--fmea", &arguments.fmea);
+    let files = destinations.files().into_iter().chain([fmea]);
+    check(named("--firmware", &firmware), files, destinations.force)?;
     let limit = time_out(arguments.time_out)?;
     // Before the campaign on the host, which takes minutes.
     let image = firmware.as_deref().map(open_image).transpose()?;
@@ -88,7 +94,10 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         rows: &rows,
     };
     let figure = || draw(&rows);
-    arguments.destinations.write(&rows, &results, figure)?;
+    destinations.write(&rows, &results, figure)?;
+    if let Some(path) = &arguments.fmea {
+        write_text(path, &fmea::table(&rows), destinations.force)?;
+    }
     let is_failure = rows.iter().any(Row::is_failure);
     Ok(if is_failure {
         Outcome::Failed

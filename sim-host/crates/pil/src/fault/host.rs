@@ -119,6 +119,7 @@ impl FaultFree {
         let mut judge = Judge::new(self.periods_per_tick, from / self.periods_per_tick);
         match fault.kind {
             Kind::Timing(failure) => now.ecu.fail(failure),
+            Kind::Controller(failure) => now.ecu.fail_controller(failure),
             _ => now.injector.begin(fault),
         }
         let to = self.end_of(from);

@@ -1,7 +1,8 @@
 //! The ECU's program on the host. Its two tasks are scheduled as by the firmware's interrupts,
-//! which can fail.
+//! which can fail, as can its controller.
 
-use super::catalogue::TimingFailure;
+use super::catalogue::{ControllerFailure, TimingFailure};
+use super::failed_controller::FailedController;
 use shared_model::ecu::{ControlInput, ControlOutput, ControlTask, Ecu, PwmTask};
 use shared_model::exchange::{FrameBytes, Packet};
 use shared_model::{InvalidScenario, Scenario};
@@ -33,6 +34,7 @@ pub struct Tasks {
     duty_code: u16,
     bridge_on: bool,
     failure: Option<TimingFailure>,
+    failed_controller: Option<FailedController>,
 }
 
 impl Tasks {
@@ -56,6 +58,7 @@ impl Tasks {
             counts: 0.0,
             counts_at_tick: 0.0,
             failure: None,
+            failed_controller: None,
         })
     }
 
@@ -68,6 +71,12 @@ impl Tasks {
             }
             _ => self.failure = Some(failure),
         }
+    }
+
+    /// Begins a failure of the controller. Call directly after a control tick.
+    pub fn fail_controller(&mut self, failure: ControllerFailure) {
+        let control_period_s = 1.0 / self.scenario.run.control_rate_hz;
+        self.failed_controller = Some(FailedController::new(failure, control_period_s));
     }
 
     /// One PWM period; `answer` as for any ECU in the loop.
@@ -151,7 +160,7 @@ impl Tasks {
             Some(TimingFailure::MissedControl) => None,
             Some(TimingFailure::Overrun(periods)) => Some(periods),
             Some(TimingFailure::DoubleControl) => {
-                self.control.run(&input);
+                self.run_control(&input);
                 Some(0)
             }
             other => {
@@ -168,11 +177,21 @@ impl Tasks {
         };
         match &mut pending.periods {
             Some(0) => {
-                self.output = Some(self.control.run(&pending.input));
+                let input = pending.input;
                 self.pending = None;
+                self.output = Some(self.run_control(&input));
             }
             Some(periods) => *periods -= 1,
             None => {}
         }
+    }
+
+    fn run_control(&mut self, input: &ControlInput) -> ControlOutput<f32> {
+        let Some(failed) = &mut self.failed_controller else {
+            return self.control.run(input);
+        };
+        failed.begin_tick();
+        self.control
+            .run_with(input, &mut |command| failed.change(command))
     }
 }

@@ -1,7 +1,7 @@
 //! Waivers: faults that may stay undetected, each with its rationale. Any other undetected fault
 //! fails the campaign.
 
-use super::catalogue::{Fault, Kind, SensorFailure, ServoFailure, Signal};
+use super::catalogue::{ControllerFailure, Fault, Kind, SensorFailure, ServoFailure, Signal};
 use super::injection::Injection;
 use super::processor_fault::{Action, ProcessorFault};
 
@@ -10,6 +10,10 @@ use super::processor_fault::{Action, ProcessorFault};
 const WHEEL_SPEED_SHARE: f32 = 0.005;
 /// The same for a signal that enters no command but that of the delayed feedback.
 const MONITORED_SHARE: f32 = 0.03;
+/// The gate's slew of the motor's share in a control tick, V.
+const MOTOR_OFFSET_V: f32 = 0.004;
+/// Share by which the amplitude may be wrong: period one is kept from -6 to +19 %.
+const AMPLITUDE_SHARE: f32 = 0.11;
 /// First data address of every Cortex-M; code has lower addresses.
 const RAM_START: u32 = 0x2000_0000;
 
@@ -18,7 +22,7 @@ struct Waiver {
     rationale: &'static str,
 }
 
-const WAIVERS: [Waiver; 6] = [
+const WAIVERS: [Waiver; 7] = [
     Waiver {
         covers: |injection| match kind(injection) {
             Some(Kind::Sensor(Signal::WheelSpeed, failure)) => is_slow(failure, WHEEL_SPEED_SHARE),
@@ -67,6 +71,14 @@ const WAIVERS: [Waiver; 6] = [
                     interpreted as a capture on an edge",
     },
     Waiver {
+        covers: |injection| match kind(injection) {
+            Some(Kind::Controller(failure)) => is_within_gate(failure),
+            _ => false,
+        },
+        rationale: "the controller's command is wrong and within the gate's limits: the gate bounds the command and does not \
+                    compute it a second time; an amplitude so close still suppresses the chaos, and a torque keeps its limit",
+    },
+    Waiver {
         covers: |injection| {
             let Injection::Processor(ProcessorFault { action, .. }) = injection else {
                 return false;
@@ -90,6 +102,20 @@ fn is_slow(failure: SensorFailure, max_share: f32) -> bool {
     match failure {
         SensorFailure::Stuck | SensorFailure::Drift(_) => true,
         SensorFailure::Step(share) | SensorFailure::Offset(share) => share.abs() <= max_share,
+        _ => false,
+    }
+}
+
+/// A command that the gate's limits allow: the motor's share of a driver who does not move, an error
+/// below the slew in a tick, a feedback that is small when its sign changes, an amplitude within the
+/// margin of the schedule.
+fn is_within_gate(failure: ControllerFailure) -> bool {
+    match failure {
+        ControllerFailure::MotorOffset(volts) => volts.abs() <= MOTOR_OFFSET_V,
+        ControllerFailure::DitherScaled(factor) => (factor - 1.0).abs() <= AMPLITUDE_SHARE,
+        ControllerFailure::MotorStuck
+        | ControllerFailure::FeedbackInverted
+        | ControllerFailure::DitherStuck => true,
         _ => false,
     }
 }
