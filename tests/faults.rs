@@ -13,7 +13,7 @@ const OVERRUN: i32 = 12;
 const WATCHDOG: i32 = 15;
 
 #[test]
-fn each_fault_neutralises_the_pwm_and_has_its_exit_code() {
+fn sr16_each_fault_neutralises_the_pwm_and_has_its_exit_code() {
     for (fault, exit_code) in [
         ("panic", 13),
         ("hard-fault", 14),

@@ -82,7 +82,7 @@ fn faults_are_repeatable() {
 }
 
 #[test]
-fn no_flipped_bit_is_undetected() {
+fn sr13_no_flipped_bit_is_undetected() {
     let bench = bench();
     let flips = flips(&target().image, FLIPS, BENCH_TICKS);
     assert_eq!(flips.len(), FLIPS * Region::ALL.len());

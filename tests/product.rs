@@ -186,7 +186,7 @@ fn every_manoeuvre_gives_the_commands_of_the_host_over_the_bus() {
 }
 
 #[test]
-fn the_dither_is_back_as_soon_as_the_speed_is_known() {
+fn sr18_the_dither_is_back_as_soon_as_the_speed_is_known() {
     let mut run = Loop::start(&product(&ecu()));
     let ramp = (1000.0 * ecu().controller.dither_ramp_s) as u32;
     run.ticks(ramp + 20, |packet| packet);
@@ -201,7 +201,7 @@ fn the_dither_is_back_as_soon_as_the_speed_is_known() {
 }
 
 #[test]
-fn bad_configurations_are_refused_by_name_with_the_servo_neutral() {
+fn sr17_bad_configurations_are_refused_by_name_with_the_servo_neutral() {
     let raw = image("ecu");
     let flash = place(&raw).expect("it has the place");
     let good = product(&ecu());
@@ -255,7 +255,7 @@ fn bad_configurations_are_refused_by_name_with_the_servo_neutral() {
 
 /// Ten bits over both blocks on the target; all of them in `shared-model`'s tests.
 #[test]
-fn a_flipped_bit_of_the_configuration_is_refused() {
+fn sr17_a_flipped_bit_of_the_configuration_is_refused() {
     let good = product(&ecu());
     let flash = place(&good).expect("it has the place");
     for bit in [
@@ -280,7 +280,7 @@ fn a_flipped_bit_of_the_configuration_is_refused() {
 }
 
 #[test]
-fn a_bus_that_is_silent_from_the_start_leaves_the_servo_neutral() {
+fn sr21_a_bus_that_is_silent_from_the_start_leaves_the_servo_neutral() {
     let mut run = Loop::start(&product(&ecu()));
     run.ticks(1000, without_frame);
     let actuation = run.actuation();
@@ -377,7 +377,7 @@ fn a_brown_out_loop_leaves_the_servo_neutral_at_each_start_and_a_working_ecu_aft
 }
 
 #[test]
-fn a_hard_fault_is_a_reset_whose_reason_is_on_the_bus_and_three_in_a_row_are_the_safe_state() {
+fn sr16_a_hard_fault_is_a_reset_whose_reason_is_on_the_bus_and_three_in_a_row_are_the_safe_state() {
     let mut session = start(&product(&ecu()));
     for round in 1..=FAULTS_IN_A_ROW {
         for _ in 0..20 {
@@ -405,7 +405,7 @@ fn a_hard_fault_is_a_reset_whose_reason_is_on_the_bus_and_three_in_a_row_are_the
 }
 
 #[test]
-fn a_control_task_that_stands_still_is_the_watchdog_s() {
+fn sr16_a_control_task_that_stands_still_is_the_watchdog_s() {
     let mut session = start(&product(&ecu()));
     for _ in 0..20 {
         session.tick().expect("it runs");

@@ -168,7 +168,7 @@ fn flash_and_ram() {
 
 /// Beside the link that proves it: the image holds no code that panics.
 #[test]
-fn no_panic_is_in_the_panic_free_image() {
+fn sr19_no_panic_is_in_the_panic_free_image() {
     let usual = BOARDS.map(|board| (board, "panic-free"));
     let can = CAN_BOARDS.map(|board| (board, "panic-free-can"));
     for (board, name) in usual.into_iter().chain(can) {

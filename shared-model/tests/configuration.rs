@@ -113,7 +113,7 @@ fn a_refusal_says_which_part_and_why() {
 
 /// A limit beyond its compiled-in range does not pass, with a whole block around it.
 #[test]
-fn no_block_widens_a_limit_beyond_its_hard_bound() {
+fn sr17_no_block_widens_a_limit_beyond_its_hard_bound() {
     let mut wide = Scenario::reconstruction();
     wide.gate.motor_voltage_v = 1e6;
     assert!(matches!(

@@ -323,7 +323,7 @@ fn gate_at(scenario: &Scenario<f32>, motor_v: f32, feedback_v: f32) -> Superviso
 }
 
 #[test]
-fn the_gate_bounds_the_feedback() {
+fn sr01_the_gate_bounds_the_feedback() {
     let limits = scenario().gate;
     let slew_v = limits.feedback_slew_v_per_s / TICKS_PER_S as f32;
     for (from, to, fault) in [

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use shared_model::Scenario;
 use shared_model::controller::Controller;
 use shared_model::dither::Waveform;
-use shared_model::gate::{Fault, Faults, Observation, Setpoint, Supervisor};
+use shared_model::gate::{Fault, FaultClass, Faults, Observation, Setpoint, Supervisor};
 use shared_model::signal::{Measurement, Mode};
 
 const CLOCK_HZ: u32 = 25_000_000;
@@ -14,6 +14,8 @@ const TICK_COUNTS: u32 = 25_000;
 const SLEW_V: f32 = 4e-3;
 const MOTOR_LIMIT_V: f32 = 4.5;
 const SQUARE_LIMIT_V: f32 = 0.2;
+/// Amplitude of the safe state.
+const SAFE_SQUARE_V: f32 = 0.125;
 /// Just beyond a limit: more than rounding, less than a PWM count.
 const ABOVE: f32 = 1.000_01;
 
@@ -95,7 +97,7 @@ fn faults_are_bits_with_names() {
         all |= fault;
         assert!(all.contains(fault) && !all.is_empty());
     }
-    assert_eq!(all.bits(), 0xF_FFFF);
+    assert_eq!(all.bits(), 0x1F_FFFF);
     assert_eq!(all.iter().collect::<Vec<_>>(), Fault::ALL);
     let mut one = Faults::from(Fault::Readback);
     one |= Faults::from(Fault::FrameAge);
@@ -110,7 +112,7 @@ fn faults_are_bits_with_names() {
 }
 
 #[test]
-fn neutral_until_the_first_measurement() {
+fn sr21_neutral_until_the_first_measurement() {
     let mut supervisor = supervisor(Waveform::Square);
     let limits = scenario(Waveform::Square).gate;
     // Neither time nor the age of a frame has a beginning yet.
@@ -140,7 +142,7 @@ fn neutral_until_the_first_measurement() {
 }
 
 #[test]
-fn no_command_before_the_first_measurement_is_followed() {
+fn sr21_no_command_before_the_first_measurement_is_followed() {
     let early = Observation {
         measurement: None,
         ..command(SLEW_V, 0.1)
@@ -151,7 +153,7 @@ fn no_command_before_the_first_measurement_is_followed() {
 }
 
 #[test]
-fn motor_voltage_has_a_limit_on_both_sides() {
+fn sr01_motor_voltage_has_a_limit_on_both_sides() {
     for sign in [1.0, -1.0] {
         let mut at = active_at(Waveform::Square, sign * MOTOR_LIMIT_V);
         for _ in 0..100 {
@@ -165,7 +167,7 @@ fn motor_voltage_has_a_limit_on_both_sides() {
 }
 
 #[test]
-fn motor_slew_has_a_limit_both_ways_from_anywhere() {
+fn sr01_motor_slew_has_a_limit_both_ways_from_anywhere() {
     for start_v in [0.0, 2.0, -2.0, 4.4, -4.4] {
         for sign in [1.0, -1.0] {
             let step_v = sign * SLEW_V;
@@ -231,7 +233,7 @@ fn a_controller_at_the_limits_raises_no_alarm() {
 }
 
 #[test]
-fn dither_amplitude_has_a_limit_for_each_waveform() {
+fn sr01_dither_amplitude_has_a_limit_for_each_waveform() {
     for (waveform, limit_v) in [
         (Waveform::None, 0.0),
         (Waveform::Square, SQUARE_LIMIT_V),
@@ -246,7 +248,7 @@ fn dither_amplitude_has_a_limit_for_each_waveform() {
         for bad in [limit_v * ABOVE + 1e-30, -1e-30, -limit_v, 1e30] {
             let mut supervisor = supervisor(waveform);
             supervisor.run(&command(0.0, if bad == 0.0 { -1.0 } else { bad }));
-            assert_only(&supervisor, Fault::DitherAmplitude);
+            assert_only(&supervisor, Fault::DitherCommand);
         }
     }
 }
@@ -263,7 +265,7 @@ fn a_command_that_is_no_number_is_named_as_that() {
 }
 
 #[test]
-fn ticks_have_a_window() {
+fn sr14_ticks_have_a_window() {
     let elapsed = |elapsed_counts| Observation {
         elapsed_counts,
         ..command(0.0, 0.0)
@@ -373,7 +375,7 @@ fn what_is_found_outside_is_a_fault_in_every_mode() {
 }
 
 #[test]
-fn an_impossible_measurement_is_a_fault_even_if_it_is_the_first() {
+fn sr07_an_impossible_measurement_is_a_fault_even_if_it_is_the_first() {
     for mut supervisor in [
         supervisor(Waveform::Square),
         active_at(Waveform::Square, 0.0),
@@ -407,9 +409,9 @@ fn the_gate_knows_the_vehicles_wheels() {
     assert_only(&supervisor, Fault::LateralAcceleration);
 }
 
-/// Dither out in 0.1 s, motor at 4 V/s, then neutral whatever comes.
+/// After a fault of the servo: dither out in 0.1 s, motor at 4 V/s, then neutral whatever comes.
 #[test]
-fn safe_state_ramps_out_and_is_latched() {
+fn sr02_sr03_safe_state_ramps_out_and_is_latched() {
     for (motor_v, amplitude_v) in [
         (3.0, 0.2),
         (-3.0, 0.1),
@@ -469,6 +471,132 @@ fn safe_state_ramps_out_and_is_latched() {
     }
 }
 
+/// The safe state's setpoint after its ramps, entered by a fault of an active ECU at that speed and
+/// amplitude; a second fault may follow.
+fn safe_setpoint(
+    waveform: Waveform,
+    speed_rpm: f32,
+    amplitude_v: f32,
+    faults: [Faults; 2],
+) -> Setpoint<f32> {
+    let mut supervisor = supervisor(waveform);
+    let observation = |found_outside| Observation {
+        measurement: Some(Measurement {
+            wheel_speed_rpm: speed_rpm,
+            ..calm()
+        }),
+        found_outside,
+        ..command(0.0, amplitude_v)
+    };
+    supervisor.run(&observation(Faults::NONE));
+    assert_clean(&supervisor);
+    let mut last = supervisor.run(&observation(faults[0]));
+    for tick in 0..500 {
+        // The commands and measurements of a broken program have no effect.
+        let found = if tick < 100 { faults[0] } else { faults[1] };
+        let now = supervisor.run(&Observation {
+            measurement: None,
+            ..Observation {
+                found_outside: found,
+                ..command(f32::NAN, 1e9)
+            }
+        });
+        let step_v = (now.dither_amplitude_v - last.dither_amplitude_v).abs();
+        assert!(step_v <= 13e-3 * 1.001, "{step_v} V");
+        last = now;
+    }
+    assert_eq!(supervisor.mode(), Mode::Safe);
+    last
+}
+
+#[test]
+fn sr04_the_safe_state_keeps_the_dither_unless_its_path_is_faulty() {
+    let kept = [FaultClass::Sensor, FaultClass::Link, FaultClass::Command];
+    for (waveform, limit_v, safe_v) in [
+        (Waveform::None, 0.0, 0.0),
+        (Waveform::Square, SQUARE_LIMIT_V, SAFE_SQUARE_V),
+        (Waveform::Sine, 1.3, 1.1),
+    ] {
+        // From above and from below.
+        for amplitude_v in [limit_v, 0.5 * safe_v] {
+            for fault in Fault::ALL {
+                let faults = [fault.into(); 2];
+                let expected_v = if kept.contains(&fault.class()) {
+                    safe_v
+                } else {
+                    0.0
+                };
+                let safe = safe_setpoint(waveform, 1750.0, amplitude_v, faults);
+                assert_eq!(safe.motor_v, 0.0);
+                assert_eq!(safe.dither_amplitude_v, expected_v, "{}", fault.name());
+            }
+        }
+    }
+}
+
+/// A bit without a name may be anything.
+#[test]
+fn sr04_sr06_the_safe_state_ends_the_dither_at_a_later_fault_of_its_path() {
+    let first = Faults::from(Fault::FrameAge);
+    let nameless = Faults::from_bits(1 << 31);
+    let others = Fault::ALL.into_iter().map(Faults::from).chain([nameless]);
+    for other in others {
+        let mut both = first;
+        both |= other;
+        let safe = safe_setpoint(Waveform::Square, 1750.0, 0.1, [first, both]);
+        let is_kept = other.iter().any(|fault| fault.class().keeps_dither());
+        assert_eq!(
+            safe.dither_amplitude_v,
+            if is_kept { SAFE_SQUARE_V } else { 0.0 }
+        );
+    }
+}
+
+/// As in all modes but the first, the time between two control ticks is judged.
+#[test]
+fn sr06_the_safe_state_judges_the_time() {
+    let mut safe = active_at(Waveform::Square, 0.0);
+    safe.run(&command(0.0, 0.1));
+    for _ in 0..200 {
+        safe.run(&command(f32::NAN, 0.0));
+    }
+    let late = Observation {
+        elapsed_counts: 2 * TICK_COUNTS,
+        ..command(0.0, 0.0)
+    };
+    let amplitudes_v = [command(0.0, 0.0), late, command(0.0, 0.0)]
+        .map(|observation| safe.run(&observation).dither_amplitude_v);
+    for (amplitude_v, expected_v) in amplitudes_v.into_iter().zip([0.125, 0.123, 0.121]) {
+        assert!((amplitude_v - expected_v).abs() < 1e-6, "{amplitudes_v:?}");
+    }
+    assert!(safe.bridge_on(), "for the ramp");
+    assert_only(&safe, Fault::CommandNotANumber);
+}
+
+/// At a low speed there is no dither to keep, and none before the first measurement.
+#[test]
+fn sr04_the_safe_state_begins_no_dither() {
+    for fault in Fault::ALL {
+        let safe = safe_setpoint(Waveform::Square, 1750.0, 0.0, [fault.into(); 2]);
+        // Without this one it was not needed.
+        let is_missing = fault == Fault::DitherWeak;
+        let expected_v = if is_missing { SAFE_SQUARE_V } else { 0.0 };
+        assert_eq!(safe.dither_amplitude_v, expected_v, "{}", fault.name());
+    }
+    let mut starting = supervisor(Waveform::Square);
+    for _ in 0..200 {
+        let setpoint = starting.run(&Observation {
+            measurement: Some(Measurement {
+                current_request_a: f32::NAN,
+                ..calm()
+            }),
+            ..command(0.0, 0.1)
+        });
+        assert_eq!(setpoint, Setpoint::neutral());
+    }
+    assert_only(&starting, Fault::SensorNotANumber);
+}
+
 /// Ticks from the start of the dither until an amplitude at a speed is found too weak.
 fn weak_after(waveform: Waveform, speed_rpm: f32, amplitude_v: f32) -> Option<u32> {
     let mut scenario = scenario(waveform);
@@ -493,7 +621,7 @@ fn weak_after(waveform: Waveform, speed_rpm: f32, amplitude_v: f32) -> Option<u3
 
 /// Amplitudes down to zero at a speed that needs dither, after its start and the time of its ramp.
 #[test]
-fn dither_that_is_too_weak_is_a_fault() {
+fn sr11_dither_that_is_too_weak_is_a_fault() {
     for (waveform, least_v) in [(Waveform::Square, 0.1_f32), (Waveform::Sine, 0.9)] {
         for weak_v in [0.0, 0.5 * least_v, least_v.next_down()] {
             for speed_rpm in [1575.0_f32.next_up(), 1750.0, 2500.0, 3000.0] {
@@ -565,7 +693,7 @@ proptest! {
 /// The bridge is off from the tick on in which the pin or a channel is wrong, in every mode, and
 /// stays off. Other faults leave it on for the ramp.
 #[test]
-fn the_bridge_goes_off_where_a_ramp_cannot_be_trusted() {
+fn sr05_the_bridge_goes_off_where_a_ramp_cannot_be_trusted() {
     for fault in Fault::ALL {
         let is_off = matches!(fault, Fault::Readback | Fault::ChannelsDiffer);
         let mut active = active_at(Waveform::Square, 1.0);
@@ -588,7 +716,7 @@ fn the_bridge_goes_off_where_a_ramp_cannot_be_trusted() {
 /// In the safe state a fault of the servo's path that was not known before switches the bridge off;
 /// the faults that caused the safe state stay as they were.
 #[test]
-fn the_safe_state_judges_the_servo() {
+fn sr06_the_safe_state_judges_the_servo() {
     let servo = [
         Fault::Readback,
         Fault::ChannelsDiffer,
@@ -712,9 +840,10 @@ prop_compose! {
 }
 
 proptest! {
-    /// Whatever is commanded: limits hold in every tick, and a fault ends in neutral for good.
+    /// Whatever is commanded: limits hold in every tick, and a fault ends for good in a motor without
+    /// voltage and in the safe state's dither or none.
     #[test]
-    fn nothing_gets_past(observations in prop::collection::vec(any_observation(), 1..60)) {
+    fn sr01_nothing_gets_past(observations in prop::collection::vec(any_observation(), 1..60)) {
         let mut supervisor = supervisor(Waveform::Square);
         let mut last = Setpoint::<f32>::neutral();
         for (observation, is_change) in &observations {
@@ -733,7 +862,8 @@ proptest! {
             if was_safe {
                 prop_assert_eq!(supervisor.mode(), Mode::Safe);
                 prop_assert!(now.motor_v.abs() <= last.motor_v.abs());
-                prop_assert!(now.dither_amplitude_v <= last.dither_amplitude_v);
+                let step_v = (now.dither_amplitude_v - last.dither_amplitude_v).abs();
+                prop_assert!(step_v <= 2e-3 * 1.001);
             }
             last = now;
         }
@@ -741,7 +871,9 @@ proptest! {
         for _ in 0..1126 {
             last = supervisor.run(&command(f32::NAN, f32::NAN));
         }
-        prop_assert_eq!(last, Setpoint::neutral());
+        prop_assert_eq!(last.motor_v, 0.0);
+        let is_kept = supervisor.faults().iter().all(|fault| fault.class().keeps_dither());
+        prop_assert!(last.dither_amplitude_v == 0.0 || is_kept && last.dither_amplitude_v == SAFE_SQUARE_V);
     }
 }
 

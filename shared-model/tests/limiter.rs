@@ -117,7 +117,7 @@ fn limits_of_whole_half_periods_raise_no_alarm() {
 }
 
 #[test]
-fn a_frequency_a_sample_outside_is_found_in_its_first_period() {
+fn sr12_a_frequency_a_sample_outside_is_found_in_its_first_period() {
     let limits = Scenario::<f32>::reconstruction().gate;
     for pwm_rate_hz in RATES_HZ {
         let shortest = half_period(pwm_rate_hz, limits.dither_frequency_max_rad_per_s).floor();
@@ -223,7 +223,7 @@ fn dither_that_was_off_begins_anew() {
 
 /// A dither that stays on one side, or within the error of zero, has no frequency.
 #[test]
-fn dither_that_does_not_swing_is_found() {
+fn sr12_dither_that_does_not_swing_is_found() {
     let unsure = 0.1 * OSCILLATOR_SINE_ERROR as f32;
     for constant in [0.1, -0.1, 0.0, 0.99 * unsure, unsure, -unsure] {
         let mut limiter = limiter();
@@ -242,7 +242,7 @@ fn dither_that_does_not_swing_is_found() {
 }
 
 #[test]
-fn a_sample_beyond_its_amplitude_does_not_go_out() {
+fn sr12_a_sample_beyond_its_amplitude_does_not_go_out() {
     let error = OSCILLATOR_SINE_ERROR as f32;
     for sign in [1.0, -1.0] {
         for within in [0.0, 0.05, 0.1, 0.1 * (1.0 + 0.99 * error)] {

@@ -65,7 +65,7 @@ fn no_measurement_is_no_fault() {
 }
 
 #[test]
-fn ranges_end_at_their_limits() {
+fn sr07_ranges_end_at_their_limits() {
     let limits = limits();
     for (signal, limit) in [
         (YAW_RATE, limits.yaw_rate_rad_per_s),
@@ -92,7 +92,7 @@ fn ranges_end_at_their_limits() {
 }
 
 #[test]
-fn what_is_no_number_is_named_as_that_alone() {
+fn sr07_what_is_no_number_is_named_as_that_alone() {
     let largest_subnormal = f32::MIN_POSITIVE.next_down();
     for signal in ALL {
         for bad in [

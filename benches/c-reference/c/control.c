@@ -30,6 +30,13 @@
 /* Faults that switch the bridge off, and those that do so if they are new in the safe state. */
 #define BRIDGE_FAULTS (1u << FAULT_READBACK | 1u << FAULT_CHANNELS_DIFFER)
 #define SERVO_FAULTS (BRIDGE_FAULTS | 1u << FAULT_DITHER_AMPLITUDE | 1u << FAULT_DITHER_FREQUENCY)
+/* Faults after which the safe state keeps the dither up. */
+#define KEEP_DITHER                                                                                        \
+    (1u << FAULT_SENSOR_NOT_A_NUMBER | 1u << FAULT_SENSOR_RANGE | 1u << FAULT_SENSOR_RATE |               \
+     1u << FAULT_SENSOR_STUCK | 1u << FAULT_STEERING_INCONSISTENT | 1u << FAULT_LATERAL_ACCELERATION |    \
+     1u << FAULT_FRAME_AGE | 1u << FAULT_FRAMES_INVALID | 1u << FAULT_COMMAND_NOT_A_NUMBER |              \
+     1u << FAULT_MOTOR_VOLTAGE | 1u << FAULT_MOTOR_SLEW | 1u << FAULT_FEEDBACK_VOLTAGE |                  \
+     1u << FAULT_FEEDBACK_SLEW | 1u << FAULT_DITHER_WEAK | 1u << FAULT_DITHER_COMMAND)
 
 enum mode { MODE_STARTING, MODE_ACTIVE, MODE_SAFE };
 
@@ -72,6 +79,8 @@ struct limits {
     float dither_above_rpm;
     float square_least_amplitude_v;
     float sine_least_amplitude_v;
+    float square_safe_amplitude_v;
+    float sine_safe_amplitude_v;
     float weak_dither_s;
     float dither_frequency_min_rad_per_s;
     float dither_frequency_max_rad_per_s;
@@ -96,6 +105,25 @@ struct limits {
     float tick_tolerance;
 };
 
+/* The limits that a running gate uses. */
+struct sensor_limits {
+    float wheel_speed_sensor_rpm;
+    float wheel_acceleration_rpm_per_s;
+    float yaw_rate_rad_per_s;
+    float yaw_acceleration_rad_per_s2;
+    float steering_angle_rad;
+    float steering_angle_change_rad_per_s;
+    float steering_rate_rad_per_s;
+    float steering_acceleration_rad_per_s2;
+    float current_request_a;
+    float lateral_acceleration_m_per_s2;
+    float steering_contradiction_rad;
+    float steering_memory_s;
+    float stuck_steering_rad;
+    float stuck_wheel_speed_rpm;
+    float dither_above_rpm;
+};
+
 struct plausibility {
     float control_period_s;
     float speed_per_rpm;
@@ -107,7 +135,9 @@ struct plausibility {
 };
 
 struct supervisor {
-    struct limits limits;
+    struct sensor_limits limits;
+    float wheel_speed_rpm;
+    float safe_wheel_speed_rpm;
     struct plausibility plausibility;
     float most_motor_v;
     float most_motor_change_v;
@@ -115,6 +145,7 @@ struct supervisor {
     float most_feedback_change_v;
     float most_dither_amplitude_v;
     float slew_v;
+    float safe_amplitude_v;
     float ramp_v;
     uint32_t window_least_counts;
     uint32_t window_most_counts;
@@ -126,7 +157,7 @@ struct supervisor {
     uint32_t weak_ticks;
     enum mode mode;
     uint32_t faults;
-    uint32_t found_outside;
+    uint32_t found;
     uint32_t bridge_on;
     struct reference_setpoint setpoint;
     /* Shares of the last command that passed. */
@@ -349,7 +380,7 @@ static inline bool is_a_number(float value)
     return isfinite(value) && (fabsf(value) >= FLT_MIN || value == 0.0f);
 }
 
-static inline uint32_t compare(struct plausibility *plausibility, const struct limits *limits,
+static inline uint32_t compare(struct plausibility *plausibility, const struct sensor_limits *limits,
                                const struct measurement *now)
 {
     const struct measurement *last = &plausibility->last;
@@ -380,7 +411,7 @@ static inline uint32_t compare(struct plausibility *plausibility, const struct l
            fault_if(!is_within(plausibility->unanswered_steering_rad, limits->stuck_steering_rad), FAULT_SENSOR_STUCK);
 }
 
-static inline uint32_t check_measurement(struct plausibility *plausibility, const struct limits *limits,
+static inline uint32_t check_measurement(struct plausibility *plausibility, const struct sensor_limits *limits,
                                          const struct measurement *now)
 {
     plausibility->ticks += 1.0f;
@@ -422,7 +453,7 @@ static inline uint32_t command_faults(const struct supervisor *supervisor, const
            fault_if(fabsf(change_v) > supervisor->most_motor_change_v, FAULT_MOTOR_SLEW) |
            fault_if(fabsf(command->feedback_v) > supervisor->most_feedback_v, FAULT_FEEDBACK_VOLTAGE) |
            fault_if(fabsf(feedback_change_v) > supervisor->most_feedback_change_v, FAULT_FEEDBACK_SLEW) |
-           fault_if(!is_amplitude, FAULT_DITHER_AMPLITUDE);
+           fault_if(!is_amplitude, FAULT_DITHER_COMMAND);
 }
 
 /* A control tick of an active ECU: the dither has been too weak for too long. */
@@ -442,7 +473,7 @@ static inline bool is_dither_missed(struct supervisor *supervisor, float amplitu
 }
 
 static inline uint32_t judge(struct supervisor *supervisor, const struct measurement *now, uint32_t frame_ticks,
-                             const struct command *command, uint32_t elapsed_counts)
+                             const struct command *command)
 {
     uint32_t faults = check_measurement(&supervisor->plausibility, &supervisor->limits, now) |
                       command_faults(supervisor, command);
@@ -455,42 +486,46 @@ static inline uint32_t judge(struct supervisor *supervisor, const struct measure
         return faults;
     faults |= fault_if(supervisor->age_ticks > supervisor->frame_age_ticks, FAULT_FRAME_AGE);
     faults |= fault_if(is_dither_missed(supervisor, command->dither_amplitude_v), FAULT_DITHER_WEAK);
-    faults |= fault_if(elapsed_counts < supervisor->window_least_counts ||
-                           elapsed_counts > supervisor->window_most_counts,
-                       FAULT_TICK_WINDOW);
     return faults;
 }
 
-static inline void towards_neutral(struct supervisor *supervisor)
+/* `value` moved to `target` by at most `step`. */
+static inline float stepped(float value, float target, float step)
+{
+    return value > target + step ? value - step : value < target - step ? value + step : target;
+}
+
+static inline void safe_setpoint(struct supervisor *supervisor)
 {
     struct reference_setpoint *setpoint = &supervisor->setpoint;
+    const bool is_trusted = !((supervisor->faults | supervisor->found) & ~(uint32_t)KEEP_DITHER);
+    const float amplitude_v = is_trusted ? supervisor->safe_amplitude_v : 0.0f;
 
-    if (setpoint->motor_v > supervisor->slew_v)
-        setpoint->motor_v -= supervisor->slew_v;
-    else if (setpoint->motor_v < -supervisor->slew_v)
-        setpoint->motor_v += supervisor->slew_v;
-    else
-        setpoint->motor_v = 0.0f;
-    if (setpoint->dither_amplitude_v > supervisor->ramp_v)
-        setpoint->dither_amplitude_v -= supervisor->ramp_v;
-    else
-        setpoint->dither_amplitude_v = 0.0f;
+    setpoint->motor_v = stepped(setpoint->motor_v, 0.0f, supervisor->slew_v);
+    setpoint->dither_amplitude_v = stepped(setpoint->dither_amplitude_v, amplitude_v, supervisor->ramp_v);
 }
 
 static inline void supervisor_run(struct supervisor *supervisor, const struct measurement *now, uint32_t frame_ticks,
                                   const struct command *command, uint32_t elapsed_counts,
                                   uint32_t found_outside)
 {
-    const uint32_t added = found_outside & ~supervisor->found_outside;
+    const bool in_time =
+        elapsed_counts >= supervisor->window_least_counts && elapsed_counts <= supervisor->window_most_counts;
+    const uint32_t added = found_outside & ~supervisor->found;
 
     if (found_outside & BRIDGE_FAULTS || (supervisor->mode == MODE_SAFE && added & SERVO_FAULTS))
         supervisor->bridge_on = false;
-    supervisor->found_outside |= found_outside;
-    if (supervisor->mode != MODE_SAFE) {
-        supervisor->faults |= found_outside | judge(supervisor, now, frame_ticks, command, elapsed_counts);
-        if (supervisor->faults)
+    supervisor->found |= found_outside;
+    if (supervisor->mode == MODE_SAFE)
+        supervisor->found |= fault_if(!in_time, FAULT_TICK_WINDOW);
+    else {
+        supervisor->faults |= found_outside | fault_if(supervisor->mode == MODE_ACTIVE && !in_time, FAULT_TICK_WINDOW) |
+                              judge(supervisor, now, frame_ticks, command);
+        if (supervisor->faults) {
             supervisor->mode = MODE_SAFE;
-        else if (now)
+            if (!(supervisor->setpoint.dither_amplitude_v > 0.0f || supervisor->faults & 1u << FAULT_DITHER_WEAK))
+                supervisor->safe_amplitude_v = 0.0f;
+        } else if (now)
             supervisor->mode = MODE_ACTIVE;
     }
     if (supervisor->mode == MODE_STARTING)
@@ -501,7 +536,7 @@ static inline void supervisor_run(struct supervisor *supervisor, const struct me
         supervisor->setpoint =
             (struct reference_setpoint){ command->motor_v + command->feedback_v, command->dither_amplitude_v };
     } else
-        towards_neutral(supervisor);
+        safe_setpoint(supervisor);
 }
 
 static inline struct reference_actuation channel_run(struct channel *channel, const struct reference_control_input *input,
@@ -529,7 +564,7 @@ static inline struct reference_actuation channel_run(struct channel *channel, co
             channel->has_measurement = true;
         }
         channel->valid_counter = channel->received_counter;
-        is_overspeed = now.wheel_speed_rpm > supervisor->limits.wheel_speed_rpm;
+        is_overspeed = now.wheel_speed_rpm > supervisor->wheel_speed_rpm;
     }
     if (channel->has_measurement)
         command = controller_run(channel, &channel->measurement, is_finite_now);
@@ -541,8 +576,8 @@ static inline struct reference_actuation channel_run(struct channel *channel, co
         .faults = supervisor->faults,
         .motor_voltage_v = supervisor->setpoint.motor_v,
         .dither_amplitude_v = supervisor->setpoint.dither_amplitude_v,
-        .wheel_speed_limit_rpm = supervisor->mode == MODE_ACTIVE ? supervisor->limits.wheel_speed_rpm :
-                                                                   supervisor->limits.safe_wheel_speed_rpm,
+        .wheel_speed_limit_rpm = supervisor->mode == MODE_ACTIVE ? supervisor->wheel_speed_rpm :
+                                                                   supervisor->safe_wheel_speed_rpm,
         .warnings = (uint16_t)(warnings(reception) | is_stale << FRAME_STALE | is_overspeed << OVERSPEED),
         .sensor_counter = channel->valid_counter,
         .bridge_on = supervisor->bridge_on && input->bridge_on,
@@ -611,6 +646,8 @@ static const struct limits RECONSTRUCTION = {
     .dither_above_rpm = 1575.0f,
     .square_least_amplitude_v = 0.1f,
     .sine_least_amplitude_v = 0.9f,
+    .square_safe_amplitude_v = 0.125f,
+    .sine_safe_amplitude_v = 1.1f,
     .weak_dither_s = 0.7f,
     .dither_frequency_min_rad_per_s = 1500.0f,
     .dither_frequency_max_rad_per_s = 5000.0f,
@@ -669,7 +706,7 @@ static void controller_init(struct controller *controller, const struct referenc
 
 static void supervisor_init(struct supervisor *supervisor, const struct reference_choice *choice)
 {
-    const struct limits *limits = &supervisor->limits;
+    const struct limits *limits = &RECONSTRUCTION;
     const float period_s = 1.0f / CONTROL_RATE_HZ;
     const float counts = (float)choice->clock_hz * period_s;
     const float tolerance = RECONSTRUCTION.tick_tolerance * counts;
@@ -677,7 +714,25 @@ static void supervisor_init(struct supervisor *supervisor, const struct referenc
                                     choice->suppressing_waveform == WAVEFORM_SINE   ? RECONSTRUCTION.sine_amplitude_v :
                                                                           0.0f;
 
-    supervisor->limits = RECONSTRUCTION;
+    supervisor->limits = (struct sensor_limits){
+        .wheel_speed_sensor_rpm = limits->wheel_speed_sensor_rpm,
+        .wheel_acceleration_rpm_per_s = limits->wheel_acceleration_rpm_per_s,
+        .yaw_rate_rad_per_s = limits->yaw_rate_rad_per_s,
+        .yaw_acceleration_rad_per_s2 = limits->yaw_acceleration_rad_per_s2,
+        .steering_angle_rad = limits->steering_angle_rad,
+        .steering_angle_change_rad_per_s = limits->steering_angle_change_rad_per_s,
+        .steering_rate_rad_per_s = limits->steering_rate_rad_per_s,
+        .steering_acceleration_rad_per_s2 = limits->steering_acceleration_rad_per_s2,
+        .current_request_a = limits->current_request_a,
+        .lateral_acceleration_m_per_s2 = limits->lateral_acceleration_m_per_s2,
+        .steering_contradiction_rad = limits->steering_contradiction_rad,
+        .steering_memory_s = limits->steering_memory_s,
+        .stuck_steering_rad = limits->stuck_steering_rad,
+        .stuck_wheel_speed_rpm = limits->stuck_wheel_speed_rpm,
+        .dither_above_rpm = limits->dither_above_rpm,
+    };
+    supervisor->wheel_speed_rpm = limits->wheel_speed_rpm;
+    supervisor->safe_wheel_speed_rpm = limits->safe_wheel_speed_rpm;
     supervisor->plausibility.control_period_s = period_s;
     supervisor->plausibility.speed_per_rpm = (float)(6.28318530717958647693 / 60.0) * 0.3f * 1.0f;
     supervisor->slew_v = limits->motor_slew_v_per_s * period_s;
@@ -687,6 +742,9 @@ static void supervisor_init(struct supervisor *supervisor, const struct referenc
     supervisor->most_feedback_v = feedback_limit_v * (1.0f + ROUNDING);
     supervisor->most_feedback_change_v = limits->feedback_slew_v_per_s * period_s + ROUNDING * feedback_limit_v;
     supervisor->most_dither_amplitude_v = amplitude_limit_v * (1.0f + ROUNDING);
+    supervisor->safe_amplitude_v = choice->suppressing_waveform == WAVEFORM_SQUARE ? limits->square_safe_amplitude_v :
+                                   choice->suppressing_waveform == WAVEFORM_SINE   ? limits->sine_safe_amplitude_v :
+                                                                         0.0f;
     supervisor->ramp_v = amplitude_limit_v * period_s / limits->ramp_out_s;
     supervisor->window_least_counts = (uint32_t)(counts - tolerance);
     supervisor->window_most_counts = (uint32_t)(counts + tolerance);

@@ -25,6 +25,7 @@ enum fault {
     FAULT_DITHER_WEAK,
     FAULT_FEEDBACK_VOLTAGE,
     FAULT_FEEDBACK_SLEW,
+    FAULT_DITHER_COMMAND,
 };
 
 static inline uint32_t fault_if(int found, enum fault fault)

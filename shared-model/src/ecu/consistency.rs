@@ -82,21 +82,44 @@ fn check_feedback<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
     )
 }
 
+/// The gate's limits for a waveform.
+struct DitherLimits<T> {
+    frequency: (&'static str, T),
+    most: (&'static str, T),
+    least: (&'static str, T),
+    safe: (&'static str, T),
+}
+
+impl<T: Real> DitherLimits<T> {
+    /// `None` without dither.
+    fn of(scenario: &Scenario<T>) -> Option<Self> {
+        let (gate, dither) = (&scenario.gate, &scenario.dither);
+        match scenario.suppressing_waveform() {
+            Waveform::None => None,
+            Waveform::Square => Some(Self {
+                frequency: ("square_frequency_rad_per_s", dither.frequency_rad_per_s()),
+                most: ("square_amplitude_v", gate.square_amplitude_v),
+                least: ("square_least_amplitude_v", gate.square_least_amplitude_v),
+                safe: ("square_safe_amplitude_v", gate.square_safe_amplitude_v),
+            }),
+            Waveform::Sine => Some(Self {
+                frequency: ("sine_frequency_rad_per_s", dither.frequency_rad_per_s()),
+                most: ("sine_amplitude_v", gate.sine_amplitude_v),
+                least: ("sine_least_amplitude_v", gate.sine_least_amplitude_v),
+                safe: ("sine_safe_amplitude_v", gate.sine_safe_amplitude_v),
+            }),
+        }
+    }
+}
+
+/// The gate must pass the schedule's greatest amplitude and the dither's frequency, and have its own
+/// amplitude of the safe state within its limits. The servo must be able to put them out beside the
+/// motor's share.
 fn check_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
-    let (gate, servo) = (&scenario.gate, &scenario.servo);
-    let (amplitude, frequency, limit_v) = match scenario.suppressing_waveform() {
-        Waveform::None => return Ok(()),
-        Waveform::Square => (
-            "square_amplitude_v",
-            "square_frequency_rad_per_s",
-            gate.square_amplitude_v,
-        ),
-        Waveform::Sine => (
-            "sine_amplitude_v",
-            "sine_frequency_rad_per_s",
-            gate.sine_amplitude_v,
-        ),
+    let Some(limits) = DitherLimits::of(scenario) else {
+        return Ok(());
     };
+    let (gate, servo) = (&scenario.gate, &scenario.servo);
     let peak_v = Table::of(scenario.suppressing_waveform()).peak_v();
     let motor_v = scenario.controller.motor_current_a * servo.winding_resistance_ohm;
     let unlimited = T::from_f64(1e6);
@@ -111,26 +134,27 @@ fn check_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
         slowest,
         two_samples,
     )?;
-    require("gate", amplitude, limit_v, peak_v, unlimited)?;
+    let ((most, most_v), (safe, safe_v)) = (limits.most, limits.safe);
+    require("gate", most, most_v, peak_v, unlimited)?;
+    require("gate", safe, safe_v, limits.least.1, most_v)?;
+    let greatest_v = if safe_v > peak_v { safe_v } else { peak_v };
     require(
         "servo",
         "bus_voltage_v",
         servo.bus_voltage_v,
-        motor_v + peak_v,
+        motor_v + greatest_v,
         unlimited,
     )?;
-    let frequency_rad_per_s = scenario.dither.frequency_rad_per_s();
+    let (frequency, frequency_rad_per_s) = limits.frequency;
     require("dither", frequency, frequency_rad_per_s, slowest, fastest)
 }
 
 /// The gate must pass the scheduled amplitudes above its speed, and the ramp to them.
 fn check_least_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange> {
-    let (gate, policy) = (&scenario.gate, &scenario.controller);
-    let (name, least_v) = match scenario.suppressing_waveform() {
-        Waveform::None => return Ok(()),
-        Waveform::Square => ("square_least_amplitude_v", gate.square_least_amplitude_v),
-        Waveform::Sine => ("sine_least_amplitude_v", gate.sine_least_amplitude_v),
+    let Some(limits) = DitherLimits::of(scenario) else {
+        return Ok(());
     };
+    let (gate, policy) = (&scenario.gate, &scenario.controller);
     let unlimited = T::from_f64(1e6);
     let on_from_rpm = policy.dither_off_below_rpm + policy.hysteresis_rpm;
     let above_rpm = gate.dither_above_rpm;
@@ -142,9 +166,10 @@ fn check_least_dither<T: Real>(scenario: &Scenario<T>) -> Result<(), OutOfRange>
         unlimited,
     )?;
     let table = Table::of(scenario.suppressing_waveform());
+    let (least, least_v) = limits.least;
     require(
         "gate",
-        name,
+        least,
         least_v,
         T::zero(),
         table.least_above_v(above_rpm),

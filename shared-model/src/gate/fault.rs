@@ -32,7 +32,7 @@ listed! {
         MotorVoltage = 10 => "motor voltage",
         /// The motor's share of the voltage changes faster than allowed.
         MotorSlew = 11 => "motor slew",
-        /// The dither is stronger than its amplitude, or the amplitude is above its limit.
+        /// A sample of the dither is greater than its amplitude.
         DitherAmplitude = 12 => "dither amplitude",
         /// The dither is slower or faster than allowed.
         DitherFrequency = 13 => "dither frequency",
@@ -48,6 +48,59 @@ listed! {
         FeedbackVoltage = 18 => "feedback voltage",
         /// The delayed feedback's share of the voltage changes faster than allowed.
         FeedbackSlew = 19 => "feedback slew",
+        /// The commanded amplitude of the dither is negative or above its limit.
+        DitherCommand = 20 => "dither command",
+    }
+}
+
+listed! {
+    /// The part that a fault is in. It determines which commands can still be trusted.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+    pub enum FaultClass {
+        /// A sensor.
+        Sensor => "sensor",
+        /// The frames from the vehicle.
+        Link => "link",
+        /// The controller.
+        Command => "command",
+        /// The generation of the dither.
+        DitherPath => "dither path",
+        /// The servo's pin and bridge.
+        MotorPath => "motor path",
+        /// The processor: time and memory.
+        Processor => "processor",
+    }
+}
+
+impl FaultClass {
+    /// Whether the dither is kept up in the safe state: its generation is not affected.
+    pub const fn keeps_dither(self) -> bool {
+        matches!(self, Self::Sensor | Self::Link | Self::Command)
+    }
+}
+
+impl Fault {
+    /// The part that the fault is in.
+    pub const fn class(self) -> FaultClass {
+        match self {
+            Self::SensorNotANumber
+            | Self::SensorRange
+            | Self::SensorRate
+            | Self::SensorStuck
+            | Self::SteeringInconsistent
+            | Self::LateralAcceleration => FaultClass::Sensor,
+            Self::FrameAge | Self::FramesInvalid => FaultClass::Link,
+            Self::CommandNotANumber
+            | Self::MotorVoltage
+            | Self::MotorSlew
+            | Self::FeedbackVoltage
+            | Self::FeedbackSlew
+            | Self::DitherWeak
+            | Self::DitherCommand => FaultClass::Command,
+            Self::DitherAmplitude | Self::DitherFrequency => FaultClass::DitherPath,
+            Self::Readback => FaultClass::MotorPath,
+            Self::TickWindow | Self::ControlLate | Self::ChannelsDiffer => FaultClass::Processor,
+        }
     }
 }
 
@@ -96,6 +149,19 @@ impl Faults {
     /// The fault is in the set.
     pub fn contains(self, fault: Fault) -> bool {
         self.0 & (1 << fault as u32) != 0
+    }
+
+    /// All faults that leave the generation of the dither unaffected.
+    pub const fn that_keep_dither() -> Self {
+        let mut bits = 0;
+        let mut rest: &[Fault] = &Fault::ALL;
+        while let [first, others @ ..] = rest {
+            if first.class().keeps_dither() {
+                bits |= 1 << *first as u32;
+            }
+            rest = others;
+        }
+        Self(bits)
     }
 
     /// The faults of the set.

@@ -30,13 +30,17 @@ parameters! {
         square_least_amplitude_v: 0.05..=0.4,
         /// Least amplitude of a sine dither above that speed, V.
         sine_least_amplitude_v: 0.45..=2.6,
+        /// Amplitude of a square dither in the safe state, V: it suppresses the chaos at any wheel speed.
+        square_safe_amplitude_v: 0.063..=0.25,
+        /// Amplitude of a sine dither in the safe state, V.
+        sine_safe_amplitude_v: 0.55..=2.2,
         /// Longest time for which the amplitude may be less there, s: it is ramped in.
         weak_dither_s: 1e-3..=1.4,
         /// Slowest dither, rad/s.
         dither_frequency_min_rad_per_s: 750.0..=1e4,
         /// Fastest dither, rad/s.
         dither_frequency_max_rad_per_s: 750.0..=1e4,
-        /// Time in which the safe state ramps the dither out, s.
+        /// Time in which the safe state ramps the greatest dither in or out, s.
         ramp_out_s: 1e-3..=0.2,
         /// Wheel speed that the safe state demands, rpm.
         safe_wheel_speed_rpm: 0.0..=1500.0,
@@ -110,6 +114,8 @@ impl<T: Real> Limits<T> {
             dither_above_rpm: number(1575.0),
             square_least_amplitude_v: number(0.1),
             sine_least_amplitude_v: number(0.9),
+            square_safe_amplitude_v: number(0.125),
+            sine_safe_amplitude_v: number(1.1),
             weak_dither_s: number(0.7),
             dither_frequency_min_rad_per_s: number(1500.0),
             dither_frequency_max_rad_per_s: number(5000.0),

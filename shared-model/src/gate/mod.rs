@@ -3,9 +3,11 @@
 //!
 //! At the control rate a [`Supervisor`] judges sensors, time and the controller's command; at the
 //! PWM rate a [`Limiter`] judges each sample of the dither and the duty seen on the servo's pin.
-//! Any fault latches the safe state until restart: the dither is ramped out, the motor's share
-//! slews to zero, and a lower wheel speed is demanded. The servo's path is judged in the safe state
-//! too: if the servo does not follow, or memory is corrupted, its bridge is switched off.
+//! Any fault latches the safe state until restart: the motor's share slews to zero, and a lower wheel
+//! speed is demanded. The class of the fault decides on a dither that is on: after a fault of sensor,
+//! link or command it is kept, at an amplitude that suppresses the chaos at any speed; after one of its
+//! own path, of the servo or of the processor it is ramped out. Servo and processor are judged in the
+//! safe state too: if the servo does not follow, or memory is corrupted, its bridge is switched off.
 
 mod fault;
 mod limiter;
@@ -13,7 +15,7 @@ mod limits;
 mod plausibility;
 mod supervisor;
 
-pub use fault::{Fault, Faults};
+pub use fault::{Fault, FaultClass, Faults};
 pub use limiter::Limiter;
 pub use limits::Limits;
 pub use plausibility::Plausibility;

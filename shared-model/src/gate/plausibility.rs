@@ -4,10 +4,52 @@ use super::{Fault, Faults, Limits};
 use crate::Real;
 use crate::signal::Measurement;
 
+/// The limits that the check uses: each number of the state is compared in every control tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct SensorLimits<T> {
+    wheel_speed_sensor_rpm: T,
+    wheel_acceleration_rpm_per_s: T,
+    yaw_rate_rad_per_s: T,
+    yaw_acceleration_rad_per_s2: T,
+    steering_angle_rad: T,
+    steering_angle_change_rad_per_s: T,
+    steering_rate_rad_per_s: T,
+    steering_acceleration_rad_per_s2: T,
+    current_request_a: T,
+    lateral_acceleration_m_per_s2: T,
+    steering_contradiction_rad: T,
+    steering_memory_s: T,
+    stuck_steering_rad: T,
+    stuck_wheel_speed_rpm: T,
+    dither_above_rpm: T,
+}
+
+impl<T: Real> SensorLimits<T> {
+    fn of(limits: &Limits<T>) -> Self {
+        Self {
+            wheel_speed_sensor_rpm: limits.wheel_speed_sensor_rpm,
+            wheel_acceleration_rpm_per_s: limits.wheel_acceleration_rpm_per_s,
+            yaw_rate_rad_per_s: limits.yaw_rate_rad_per_s,
+            yaw_acceleration_rad_per_s2: limits.yaw_acceleration_rad_per_s2,
+            steering_angle_rad: limits.steering_angle_rad,
+            steering_angle_change_rad_per_s: limits.steering_angle_change_rad_per_s,
+            steering_rate_rad_per_s: limits.steering_rate_rad_per_s,
+            steering_acceleration_rad_per_s2: limits.steering_acceleration_rad_per_s2,
+            current_request_a: limits.current_request_a,
+            lateral_acceleration_m_per_s2: limits.lateral_acceleration_m_per_s2,
+            steering_contradiction_rad: limits.steering_contradiction_rad,
+            steering_memory_s: limits.steering_memory_s,
+            stuck_steering_rad: limits.stuck_steering_rad,
+            stuck_wheel_speed_rpm: limits.stuck_wheel_speed_rpm,
+            dither_above_rpm: limits.dither_above_rpm,
+        }
+    }
+}
+
 /// The plausibility check of the measurements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plausibility<T> {
-    limits: Limits<T>,
+    limits: SensorLimits<T>,
     control_period_s: T,
     /// Speed at a wheel speed of 1 rpm, m/s.
     speed_per_rpm: T,
@@ -25,7 +67,7 @@ impl<T: Real> Plausibility<T> {
     /// No measurement yet.
     pub fn new(limits: &Limits<T>, control_period_s: T, speed_per_rpm: T) -> Self {
         Self {
-            limits: *limits,
+            limits: SensorLimits::of(limits),
             control_period_s,
             speed_per_rpm,
             last: None,
@@ -33,11 +75,6 @@ impl<T: Real> Plausibility<T> {
             contradiction_rad: T::zero(),
             unanswered_steering_rad: T::zero(),
         }
-    }
-
-    /// All limits of the gate.
-    pub fn limits(&self) -> &Limits<T> {
-        &self.limits
     }
 
     /// Whether the dither must be present at the last wheel speed; not before the first measurement.

@@ -40,6 +40,8 @@ const SERVO_FAULTS: Faults = Faults::of([
     Fault::DitherAmplitude,
     Fault::DitherFrequency,
 ]);
+/// Faults after which the safe state keeps the dither up.
+const KEEP_DITHER: Faults = Faults::that_keep_dither();
 
 /// Greatest magnitudes of a command, rounding included.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,10 +109,16 @@ impl<T: Real> LeastDither<T> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Supervisor<T> {
     plausibility: Plausibility<T>,
+    /// Greatest wheel speed of the vehicle, and that of the safe state, rpm.
+    wheel_speed_rpm: T,
+    safe_wheel_speed_rpm: T,
     command_limits: CommandLimits<T>,
     /// Change of the motor's share in a control tick of the safe state, V.
     slew_v: T,
-    /// Decrease of the amplitude in a control tick of the safe state, V.
+    /// Amplitude that the safe state keeps up while the dither can be trusted, V; zero if it began
+    /// without a dither.
+    safe_amplitude_v: T,
+    /// Change of the amplitude in a control tick of the safe state, V.
     ramp_v: T,
     /// Least and most counts of the clock in a control tick.
     window_counts: (u32, u32),
@@ -120,8 +128,8 @@ pub struct Supervisor<T> {
     least_dither: LeastDither<T>,
     mode: Mode,
     faults: Faults,
-    /// Faults found outside so far.
-    found_outside: Faults,
+    /// Faults found outside so far, and late ticks of the safe state.
+    found: Faults,
     bridge_on: bool,
     setpoint: Setpoint<T>,
     /// Of the last command that passed.
@@ -134,10 +142,10 @@ impl<T: Real> Supervisor<T> {
         let limits = scenario.gate;
         let period_s = T::one() / scenario.run.control_rate_hz;
         let speed_per_rpm = scenario.vehicle.speed_m_per_s(T::one());
-        let amplitude_limit_v = match scenario.suppressing_waveform() {
-            Waveform::None => T::zero(),
-            Waveform::Square => limits.square_amplitude_v,
-            Waveform::Sine => limits.sine_amplitude_v,
+        let (amplitude_limit_v, safe_amplitude_v) = match scenario.suppressing_waveform() {
+            Waveform::None => (T::zero(), T::zero()),
+            Waveform::Square => (limits.square_amplitude_v, limits.square_safe_amplitude_v),
+            Waveform::Sine => (limits.sine_amplitude_v, limits.sine_safe_amplitude_v),
         };
         let slew_v = limits.motor_slew_v_per_s * period_s;
         let feedback_limit_v = if scenario.controller.suppression.has_feedback() {
@@ -151,6 +159,8 @@ impl<T: Real> Supervisor<T> {
         let tolerance = limits.tick_tolerance * counts;
         Self {
             plausibility: Plausibility::new(&limits, period_s, speed_per_rpm),
+            wheel_speed_rpm: limits.wheel_speed_rpm,
+            safe_wheel_speed_rpm: limits.safe_wheel_speed_rpm,
             command_limits: CommandLimits {
                 motor_v: limits.motor_voltage_v * (T::one() + rounding),
                 motor_change_v: slew_v + rounding * limits.motor_voltage_v,
@@ -159,6 +169,7 @@ impl<T: Real> Supervisor<T> {
                 dither_amplitude_v: amplitude_limit_v * (T::one() + rounding),
             },
             slew_v,
+            safe_amplitude_v,
             ramp_v: amplitude_limit_v * period_s / limits.ramp_out_s,
             window_counts: ((counts - tolerance).to_u32(), (counts + tolerance).to_u32()),
             frame_age_ticks: limits.frame_age_ticks(scenario.run.control_rate_hz),
@@ -166,7 +177,7 @@ impl<T: Real> Supervisor<T> {
             least_dither: LeastDither::new(scenario),
             mode: Mode::Starting,
             faults: Faults::NONE,
-            found_outside: Faults::NONE,
+            found: Faults::NONE,
             bridge_on: true,
             setpoint: Setpoint::neutral(),
             shares: Shares {
@@ -185,30 +196,35 @@ impl<T: Real> Supervisor<T> {
             self.faults |= found;
             self.mode = self.next_mode(seen.measurement.is_some());
         }
-        self.setpoint = match self.mode {
-            Mode::Starting => Setpoint::neutral(),
+        match self.mode {
+            Mode::Starting => self.setpoint = Setpoint::neutral(),
             Mode::Active => {
                 self.shares = Shares {
                     motor_v: seen.motor_v,
                     feedback_v: seen.feedback_v,
                 };
-                Setpoint {
+                self.setpoint = Setpoint {
                     motor_v: seen.motor_v + seen.feedback_v,
                     dither_amplitude_v: seen.dither_amplitude_v,
-                }
+                };
             }
-            Mode::Safe => self.towards_neutral(),
-        };
+            Mode::Safe => self.step_safe_state(seen.elapsed_counts),
+        }
         self.setpoint
     }
 
     /// Switches the bridge off after a fault in which the servo may not follow its ramp to neutral,
     /// and after any fault of its path that the safe state's ramp adds to those known before.
     fn judge_bridge(&mut self, found_outside: Faults) {
-        let added = found_outside.without(self.found_outside);
+        let added = found_outside.without(self.found);
         let ramp_is_wrong = self.mode == Mode::Safe && added.intersects(SERVO_FAULTS);
         self.bridge_on &= !(found_outside.intersects(BRIDGE_FAULTS) || ramp_is_wrong);
-        self.found_outside |= found_outside;
+        self.found |= found_outside;
+    }
+
+    fn is_in_time(&self, elapsed_counts: u32) -> bool {
+        let (least, most) = self.window_counts;
+        (least..=most).contains(&elapsed_counts)
     }
 
     fn next_mode(&self, has_measurement: bool) -> Mode {
@@ -240,9 +256,8 @@ impl<T: Real> Supervisor<T> {
         let amplitude_v = seen.dither_amplitude_v;
         let is_missed = self.least_dither.is_missed(is_needed, amplitude_v);
         faults.add_if(is_missed, Fault::DitherWeak);
-        let (least, most) = self.window_counts;
-        let in_time = (least..=most).contains(&seen.elapsed_counts);
-        faults.add_if(!in_time, Fault::TickWindow);
+        let is_late = !self.is_in_time(seen.elapsed_counts);
+        faults.add_if(is_late, Fault::TickWindow);
         faults
     }
 
@@ -265,26 +280,32 @@ impl<T: Real> Supervisor<T> {
         faults.add_if(change_v.abs() > limits.motor_change_v, Fault::MotorSlew);
         faults.add_if(is_feedback, Fault::FeedbackVoltage);
         faults.add_if(is_feedback_change, Fault::FeedbackSlew);
-        faults.add_if(!is_amplitude, Fault::DitherAmplitude);
+        faults.add_if(!is_amplitude, Fault::DitherCommand);
         faults
     }
 
-    fn towards_neutral(&self) -> Setpoint<T> {
-        let motor_v = self.setpoint.motor_v;
-        Setpoint {
-            motor_v: if motor_v > self.slew_v {
-                motor_v - self.slew_v
-            } else if motor_v < -self.slew_v {
-                motor_v + self.slew_v
-            } else {
-                T::zero()
-            },
-            dither_amplitude_v: if self.setpoint.dither_amplitude_v > self.ramp_v {
-                self.setpoint.dither_amplitude_v - self.ramp_v
-            } else {
-                T::zero()
-            },
+    /// The motor without voltage. The dither, while it can be trusted, at an amplitude that suppresses
+    /// the chaos at any speed. It is kept, not begun, unless it is what was missing.
+    #[inline(never)]
+    fn step_safe_state(&mut self, elapsed_counts: u32) {
+        let is_late = !self.is_in_time(elapsed_counts);
+        self.found.add_if(is_late, Fault::TickWindow);
+        let is_on = self.setpoint.dither_amplitude_v > T::zero();
+        if !is_on && !self.faults.contains(Fault::DitherWeak) {
+            self.safe_amplitude_v = T::zero();
         }
+        let mut found = self.faults;
+        found |= self.found;
+        let is_trusted = found.without(KEEP_DITHER).is_empty();
+        let amplitude_v = if is_trusted {
+            self.safe_amplitude_v
+        } else {
+            T::zero()
+        };
+        self.setpoint = Setpoint {
+            motor_v: stepped(self.setpoint.motor_v, T::zero(), self.slew_v),
+            dither_amplitude_v: stepped(self.setpoint.dither_amplitude_v, amplitude_v, self.ramp_v),
+        };
     }
 
     /// The ECU's operating mode.
@@ -299,7 +320,7 @@ impl<T: Real> Supervisor<T> {
 
     /// Whether a measurement is above the greatest wheel speed of the vehicle.
     pub fn is_overspeed(&self, measurement: &Measurement<T>) -> bool {
-        measurement.wheel_speed_rpm > self.plausibility.limits().wheel_speed_rpm
+        measurement.wheel_speed_rpm > self.wheel_speed_rpm
     }
 
     /// Whether the servo's bridge may be on. Once off, it is off until restart.
@@ -314,10 +335,20 @@ impl<T: Real> Supervisor<T> {
 
     /// Wheel speed that the vehicle must not exceed, rpm.
     pub fn wheel_speed_limit_rpm(&self) -> T {
-        let limits = self.plausibility.limits();
         match self.mode {
-            Mode::Active => limits.wheel_speed_rpm,
-            Mode::Starting | Mode::Safe => limits.safe_wheel_speed_rpm,
+            Mode::Active => self.wheel_speed_rpm,
+            Mode::Starting | Mode::Safe => self.safe_wheel_speed_rpm,
         }
+    }
+}
+
+/// `value` moved to `target` by at most `step`.
+fn stepped<T: Real>(value: T, target: T, step: T) -> T {
+    if value > target + step {
+        value - step
+    } else if value < target - step {
+        value + step
+    } else {
+        target
     }
 }

@@ -1,14 +1,17 @@
 //! The measures of chaos against something independent.
 
+use dynamics::attractor::{Kind, attractors};
 use dynamics::flow::VehicleFlow;
 use dynamics::lyapunov::{Exponent, largest};
 use dynamics::period::{Period, TOLERANCE, period};
 use dynamics::simulate::{settle, simulate, started_at};
 use dynamics::trace::Trace;
+use dynamics::sweep::{RunControl, Timing, mirrored};
 use dynamics::two_particle;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use shared_model::friction::FrictionLaw;
+use shared_model::vehicle::STEERING_ANGLE;
 
 const RUN_S: f64 = 400.0;
 
@@ -171,4 +174,42 @@ fn dither_makes_the_motion_period_one() {
         let exponent = largest(&scenario, &trace, from).expect("the run is long enough");
         assert!(!exponent.is_positive(), "{waveform:?}: {exponent}");
     }
+}
+
+/// The amplitude that the gate keeps in the safe state, at any speed to which a vehicle may slow down
+/// or up to which it may be wrong.
+#[test]
+fn sr04_the_safe_states_amplitude_suppresses_the_chaos_at_every_speed() {
+    let mut scenarios = Vec::new();
+    for waveform in [Waveform::Square, Waveform::Sine] {
+        for step in 0..=140 {
+            let mut scenario = Scenario::reconstruction();
+            scenario.run.wheel_speed_rpm = 1100.0 + 10.0 * f64::from(step);
+            scenario.dither.waveform = waveform;
+            scenario.dither.amplitude_v = match waveform {
+                Waveform::Sine => scenario.gate.sine_safe_amplitude_v,
+                _ => scenario.gate.square_safe_amplitude_v,
+            };
+            scenarios.extend([scenario, mirrored(&scenario)]);
+        }
+    }
+    let timing = Timing::new(300.0, 500.0).expect("it is valid");
+    let found = attractors(&scenarios, timing, true, RunControl::none()).expect("they are valid");
+    let mut greatest_rad: f64 = 0.0;
+    for (scenario, attractor) in scenarios.iter().zip(found) {
+        let attractor = attractor.expect("it is not stopped");
+        let peak_to_peak_rad = attractor.upper[STEERING_ANGLE] - attractor.lower[STEERING_ANGLE];
+        greatest_rad = greatest_rad.max(peak_to_peak_rad);
+        let is_calm = matches!(attractor.kind, Kind::Periodic(1) | Kind::Equilibrium);
+        // Near the onset of the motion out of rest a small motion takes longer to settle.
+        assert!(
+            is_calm || peak_to_peak_rad < 0.05,
+            "{:?} {} rpm: {:?}, {peak_to_peak_rad} rad",
+            scenario.dither.waveform,
+            scenario.run.wheel_speed_rpm,
+            attractor.kind
+        );
+    }
+    println!("greatest peak-to-peak steering angle: {greatest_rad:.3} rad");
+    assert!(greatest_rad < 0.7, "{greatest_rad} rad");
 }
