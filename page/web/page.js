@@ -1,0 +1,183 @@
+/** Time without a change after which a motion is measured, ms. */
+const MEASURED_AFTER_MS = 150;
+
+/** The settings of a link, by their keys; a preset discards those before it. */
+function parse(text) {
+  const settings = new Map();
+  for (const setting of text.split("&").filter(Boolean)) {
+    const [key, ...value] = setting.split("=");
+    if (key === "preset") settings.clear();
+    settings.set(key, value.join("="));
+  }
+  return settings;
+}
+
+function textOf(settings) {
+  return Array.from(settings, ([key, value]) => `${key}=${value}`).join("&");
+}
+
+class Page {
+  #settings = new Map();
+  #shown = null;
+  #timer = null;
+  #frame = null;
+  #error = document.getElementById("error");
+  #regime = document.getElementById("regime");
+
+  constructor(model, bytes) {
+    this.model = model;
+    this.plots = new Plots();
+    this.playback = new Playback((time) => this.plots.mark(time));
+    model.configure("");
+    this.controls = new Controls(model, (key, value) => this.#change(key, value));
+    this.#addPresets();
+    this.#startMeasuring(bytes);
+    addEventListener("hashchange", () => this.#restore());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.plots.draw());
+    document.getElementById("skip").addEventListener("click", () => document.getElementById("settings").focus());
+    document.getElementById("copy").addEventListener("click", () => this.#copy());
+    const refused = this.#restore();
+    if (refused) {
+      this.#apply(new Map());
+      this.#refuse(refused);
+    }
+  }
+
+  /** Takes the settings of the address; returns why not if they are wrong, and then nothing changes. */
+  #restore() {
+    let text = location.hash.slice(1);
+    if (text === textOf(this.#settings) && this.#shown) return "";
+    try {
+      text = decodeURIComponent(text);
+    } catch {
+      return this.#refuse(`The link is damaged: ${text}`);
+    }
+    const refused = this.#apply(parse(text), text);
+    return refused && this.#refuse(`The link has a wrong setting. ${refused}`);
+  }
+
+  #change(key, value) {
+    const settings = new Map(this.#settings);
+    settings.set(key, value);
+    // A slider's events come faster than frames.
+    cancelAnimationFrame(this.#frame);
+    this.#frame = requestAnimationFrame(() => this.#apply(settings));
+    this.#settings = settings;
+  }
+
+  /** Configures the model, and shows its motion; if it refuses, the last motion stays, and the message is returned. */
+  #apply(settings, text = textOf(settings)) {
+    let scenario, run, without;
+    try {
+      scenario = this.model.configure(text);
+      run = this.model.run();
+      without = scenario.dither.waveform === "none" ? null : this.model.run(false);
+    } catch (error) {
+      return this.#refuse(error.message);
+    }
+    this.#refuse("");
+    this.#settings = settings;
+    this.#shown = { text, scenario, run, without, settled: null };
+    this.controls.show(scenario);
+    this.plots.show(this.#shown);
+    this.playback.setEnd(run.states.length / COMPONENTS * run.step_s);
+    document.getElementById("legend").hidden = !without;
+    for (const button of document.querySelectorAll("#presets button")) {
+      button.setAttribute("aria-pressed", String(button.dataset.settings === textOf(settings)));
+    }
+    history.replaceState(null, "", `#${textOf(settings)}`);
+    document.getElementById("link").value = location.href;
+    this.#regime.setAttribute("aria-busy", "true");
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => this.worker.postMessage({ settings: text }), MEASURED_AFTER_MS);
+    return "";
+  }
+
+  /** Shows why settings were refused, and returns it; an empty message is none. */
+  #refuse(message) {
+    this.#error.textContent = message;
+    this.#error.hidden = message === "";
+    this.controls.mark(message);
+    return message;
+  }
+
+  #startMeasuring(bytes) {
+    const code = ["model-code", "measuring-code"].map((id) => document.getElementById(id).textContent);
+    const source = URL.createObjectURL(new Blob(code, { type: "text/javascript" }));
+    this.worker = new Worker(source);
+    this.worker.postMessage({ module: bytes });
+    this.worker.addEventListener("message", ({ data }) => {
+      // Of settings that have changed since.
+      if (data.settings !== this.#shown?.text) return;
+      this.#regime.setAttribute("aria-busy", "false");
+      if (data.error) return this.#report("Not measured", data.error, "unknown");
+      this.#shown.settled = data.measured.leaves_bounds_at_s === null ? data.measured : null;
+      this.plots.show(this.#shown);
+      this.#showMeasured(data.measured);
+    });
+  }
+
+  #showMeasured({ regime, is_chaotic, exponent_per_s, standard_error_per_s, threshold_per_s, observed_s, transient_s, leaves_bounds_at_s }) {
+    if (leaves_bounds_at_s !== null) {
+      const text = `The state leaves all bounds at ${leaves_bounds_at_s.toFixed(2)} s: the motion diverges, or the step is too long.`;
+      return this.#report("Unbounded", text, "chaos");
+    }
+    // One digit of the error at least, and no more than six decimals.
+    const digits = Math.min(6, Math.max(3, -Math.floor(Math.log10(standard_error_per_s ?? 1))));
+    const number = (value, decimals = digits) => value.toFixed(decimals).replace("-", "\u2212");
+    const span = `Over ${observed_s} s after a transient of ${transient_s} s`;
+    const word = regime[0].toUpperCase() + regime.slice(1);
+    const kind = is_chaotic ? "chaos" : regime === "undecided" ? "unknown" : "regular";
+    if (exponent_per_s === null) return this.#report(word, "The largest Lyapunov exponent is not finite.", kind, `${span}.`);
+    const exponent = `Largest Lyapunov exponent ${number(exponent_per_s)} \u00b1 ${number(standard_error_per_s)} 1/s`;
+    this.#report(word, exponent, kind, `${span}; positive from ${number(threshold_per_s, 3)} 1/s on.`);
+  }
+
+  /** Shows the regime; a screen reader reads it. */
+  #report(word, exponent, kind, span = "") {
+    this.#regime.dataset.kind = kind;
+    this.#regime.querySelector("strong").textContent = word;
+    this.#regime.querySelector(".exponent").textContent = exponent;
+    this.#regime.querySelector(".span").textContent = span;
+  }
+
+  #addPresets() {
+    const list = document.getElementById("presets");
+    for (const { name, where, text, settings } of PRESETS) {
+      const button = element("button", { type: "button", "data-settings": settings, title: text }, element("b", {}, name), element("small", {}, where));
+      button.addEventListener("click", () => this.#apply(parse(settings)));
+      list.append(element("li", {}, button));
+    }
+  }
+
+  async #copy() {
+    const link = document.getElementById("link");
+    link.select();
+    const words = document.getElementById("copied");
+    try {
+      await navigator.clipboard.writeText(link.value);
+      words.textContent = "Copied.";
+    } catch {
+      words.textContent = "Selected: copy it with the keyboard.";
+    }
+  }
+}
+
+/** The model for the browser's console: `dithersteer.configure("run.wheel_speed_rpm=1600"); dithersteer.run()`. */
+let dithersteer = null;
+
+async function start() {
+  const text = document.getElementById("module").textContent.trim();
+  const packed = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+  const unpacked = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
+  const bytes = await new Response(unpacked).arrayBuffer();
+  const model = await Model.from(bytes);
+  new Page(model, bytes);
+  dithersteer = await Model.from(bytes);
+}
+
+start().catch((error) => {
+  const place = document.getElementById("error");
+  place.textContent = `This browser cannot run the page: ${error.message}`;
+  place.hidden = false;
+});
