@@ -56,7 +56,7 @@ class Axes {
     context.strokeStyle = colour("grid");
     context.fillStyle = colour("ink");
     const across = ticks(...this.x, Math.max(2, (right - left) / 75));
-    const up = ticks(...this.y, Math.max(2, (bottom - top) / 38));
+    const up = ticks(...this.y, Math.max(2, (bottom - top) / 26));
     context.beginPath();
     for (const { value } of across) {
       const at = Math.round(this.horizontal(value)) + 0.5;

@@ -142,7 +142,8 @@ class Plots {
       axes.line(Math.floor(count(one) / every), (k) => [one.states[k * every * COMPONENTS + SIDESLIP], one.states[k * every * COMPONENTS + YAW_RATE]], style);
     };
     line(without ?? run, { ...this.#other(1), dashes: [] });
-    line(main, this.#main(without ? 2 : 1.2));
+    // A chaotic attractor of many turns would become a blot.
+    line(main, this.#main(settled?.is_chaotic ? 0.8 : 2));
     const last = main.states.subarray(main.states.length - COMPONENTS);
     const [beta, gamma] = [SIDESLIP, YAW_RATE].map((component) => range(main.states, component, 1));
     const isPoint = [beta, gamma].every(([low, high], k) => high - low < 0.01 * (spans[k][1] - spans[k][0]));

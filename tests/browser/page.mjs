@@ -1,7 +1,7 @@
 // Drives the page in Chromium for tests/page.rs: node page.mjs DRIVER CHROMIUM PAGE FOLDER SETTINGS
 //
 // Asserts what a user sees, and writes the states and duty codes of the page's model under SETTINGS, and its measures
-// without settings, into FOLDER.
+// without settings, into FOLDER, beside the documentation's picture page.png.
 
 import assert from "node:assert/strict";
 import { writeFileSync } from "node:fs";
@@ -170,6 +170,13 @@ const steps = {
       papers.add(await page.evaluate(() => getComputedStyle(document.documentElement).backgroundColor));
     }
     assert.equal(papers.size, 2);
+  },
+
+  async "the picture of the documentation"() {
+    const page = await open("#dither.waveform=sine&dither.amplitude_v=1", { reducedMotion: "reduce" });
+    await page.fill("#time", "14");
+    await page.evaluate(() => document.activeElement.blur());
+    await page.screenshot({ path: join(folder, "page.png") });
   },
 
   async "the model's bits"() {

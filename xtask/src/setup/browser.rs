@@ -21,7 +21,7 @@ const BROWSERS: [&str; 4] = [
 ];
 const NODE: &str = "node";
 const NPM: &str = "npm";
-/// The driver and its exact version, and their check sums.
+/// The driver and its exact version, and their checksums.
 const MANIFESTS: [&str; 2] = ["package.json", "package-lock.json"];
 
 /// What the test of the page runs on.
