@@ -1,18 +1,12 @@
-// Runs in a worker: measures the settled motion of the settings that it receives.
-const model = new Promise((resolve) => {
-  addEventListener("message", ({ data }) => {
-    if (data.module) resolve(Model.from(data.module));
-  });
-});
-
-addEventListener("message", async ({ data }) => {
-  if (!("settings" in data)) return;
-  const ready = await model;
+// Runs in a worker: measures the settled motion of settings, and ends.
+addEventListener("message", async ({ data: { module, settings } }) => {
   try {
-    ready.configure(data.settings);
-    const measured = ready.measure();
-    postMessage({ settings: data.settings, measured }, [measured.states.buffer]);
+    const model = await Model.from(module);
+    model.configure(settings);
+    const measured = model.measure();
+    postMessage({ measured }, [measured.states.buffer]);
   } catch (error) {
-    postMessage({ settings: data.settings, error: error.message });
+    postMessage({ error: error.message });
   }
+  close();
 });

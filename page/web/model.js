@@ -5,9 +5,8 @@ const MESSAGE = 0, STATES = 1, DUTIES = 2;
 
 /** The module of the package `page`, with its calls as methods that throw their error messages. */
 class Model {
-  static async from(bytes) {
-    const { instance } = await WebAssembly.instantiate(bytes, {});
-    return new Model(instance.exports);
+  static async from(module) {
+    return new Model((await WebAssembly.instantiate(module, {})).exports);
   }
 
   constructor(exports) {

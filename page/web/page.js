@@ -20,18 +20,22 @@ class Page {
   #settings = new Map();
   #shown = null;
   #timer = null;
+  #worker = null;
+  #measuring = null;
   #frame = null;
   #error = document.getElementById("error");
   #regime = document.getElementById("regime");
 
-  constructor(model, bytes) {
+  constructor(model, module) {
     this.model = model;
+    this.module = module;
+    const code = ["model-code", "measuring-code"].map((id) => document.getElementById(id).textContent);
+    this.#measuring = URL.createObjectURL(new Blob(code, { type: "text/javascript" }));
     this.plots = new Plots();
     this.playback = new Playback((time) => this.plots.mark(time));
     model.configure("");
     this.controls = new Controls(model, (key, value) => this.#change(key, value));
     this.#addPresets();
-    this.#startMeasuring(bytes);
     addEventListener("hashchange", () => this.#restore());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.plots.draw());
     document.getElementById("skip").addEventListener("click", () => document.getElementById("settings").focus());
@@ -89,7 +93,9 @@ class Page {
     document.getElementById("link").value = location.href;
     this.#regime.setAttribute("aria-busy", "true");
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => this.worker.postMessage({ settings: text }), MEASURED_AFTER_MS);
+    // A measurement of an earlier motion is abandoned.
+    this.#worker?.terminate();
+    this.#timer = setTimeout(() => this.#measure(), MEASURED_AFTER_MS);
     return "";
   }
 
@@ -101,20 +107,17 @@ class Page {
     return message;
   }
 
-  #startMeasuring(bytes) {
-    const code = ["model-code", "measuring-code"].map((id) => document.getElementById(id).textContent);
-    const source = URL.createObjectURL(new Blob(code, { type: "text/javascript" }));
-    this.worker = new Worker(source);
-    this.worker.postMessage({ module: bytes });
-    this.worker.addEventListener("message", ({ data }) => {
-      // Of settings that have changed since.
-      if (data.settings !== this.#shown?.text) return;
+  /** Measures the motion shown. */
+  #measure() {
+    this.#worker = new Worker(this.#measuring);
+    this.#worker.addEventListener("message", ({ data: { measured, error } }) => {
       this.#regime.setAttribute("aria-busy", "false");
-      if (data.error) return this.#report("Not measured", data.error, "unknown");
-      this.#shown.settled = data.measured.leaves_bounds_at_s === null ? data.measured : null;
+      if (error) return this.#report("Not measured", error, "unknown");
+      this.#shown.settled = measured.leaves_bounds_at_s === null ? measured : null;
       this.plots.show(this.#shown);
-      this.#showMeasured(data.measured);
+      this.#showMeasured(measured);
     });
+    this.#worker.postMessage({ module: this.module, settings: this.#shown.text });
   }
 
   #showMeasured({ regime, is_chaotic, exponent_per_s, standard_error_per_s, threshold_per_s, observed_s, transient_s, leaves_bounds_at_s }) {
@@ -170,10 +173,9 @@ async function start() {
   const text = document.getElementById("module").textContent.trim();
   const packed = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
   const unpacked = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-  const bytes = await new Response(unpacked).arrayBuffer();
-  const model = await Model.from(bytes);
-  new Page(model, bytes);
-  dithersteer = await Model.from(bytes);
+  const module = await WebAssembly.compile(await new Response(unpacked).arrayBuffer());
+  new Page(await Model.from(module), module);
+  dithersteer = await Model.from(module);
 }
 
 start().catch((error) => {

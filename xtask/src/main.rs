@@ -54,7 +54,8 @@ enum Command {
     /// from rustup, or where rustup cannot download, from Debian's Rust packages; QEMU comes
     /// from the system's packages. The runner is the program that `cargo run` in firmware/
     /// starts. Python packages for the tests go into target/python; the system's Python is not
-    /// changed.
+    /// changed. The page's test takes Chromium and Node.js from the system's packages; their driver goes
+    /// into target/browser.
     #[command(
         after_help = "Example:\n  cargo xtask setup && cd firmware && cargo run --profile firmware --bin bench"
     )]
