@@ -1,5 +1,5 @@
-/** Time without a change after which a motion is measured, ms. */
-const MEASURED_AFTER_MS = 150;
+/** Time without a change after which the address follows and the motion is measured, ms. */
+const REST_MS = 150;
 
 /** The settings of a link, by their keys; a preset discards those before it. */
 function parse(text) {
@@ -89,13 +89,11 @@ class Page {
     for (const button of document.querySelectorAll("#presets button")) {
       button.setAttribute("aria-pressed", String(button.dataset.settings === textOf(settings)));
     }
-    history.replaceState(null, "", `#${textOf(settings)}`);
-    document.getElementById("link").value = location.href;
     this.#regime.setAttribute("aria-busy", "true");
     clearTimeout(this.#timer);
     // A measurement of an earlier motion is abandoned.
     this.#worker?.terminate();
-    this.#timer = setTimeout(() => this.#measure(), MEASURED_AFTER_MS);
+    this.#timer = setTimeout(() => this.#rest(), REST_MS);
     return "";
   }
 
@@ -107,8 +105,8 @@ class Page {
     return message;
   }
 
-  /** Measures the motion shown. */
-  #measure() {
+  /** Measures the motion, and writes the settings into the address, which browsers allow a few times per second only. */
+  #rest() {
     this.#worker = new Worker(this.#measuring);
     this.#worker.addEventListener("message", ({ data: { measured, error } }) => {
       this.#regime.setAttribute("aria-busy", "false");
@@ -118,6 +116,8 @@ class Page {
       this.#showMeasured(measured);
     });
     this.#worker.postMessage({ module: this.module, settings: this.#shown.text });
+    history.replaceState(null, "", `#${textOf(this.#settings)}`);
+    document.getElementById("link").value = location.href;
   }
 
   #showMeasured({ regime, is_chaotic, exponent_per_s, standard_error_per_s, threshold_per_s, observed_s, transient_s, leaves_bounds_at_s }) {

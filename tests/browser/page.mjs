@@ -35,7 +35,7 @@ const exponent = async (page) => Number((await page.textContent("#regime .expone
 const value = (page, key) => page.inputValue(`[id="${key}"]`);
 const slider = (key) => `[id="slider-${key}"]`;
 
-/** The regime after a change, which the address shows at once. */
+/** The regime after a change, which the address shows when the measurement begins. */
 async function changed(page, change) {
   const before = page.url();
   await change();
