@@ -1,11 +1,14 @@
 #![doc = include_str!("../README.md")]
 
+mod feedback;
 mod measured;
 mod motion;
 mod settings;
 
 use serde::Serialize;
 use shared_model::Scenario;
+use shared_model::dither::Waveform;
+use shared_model::policy::Suppression;
 use std::sync::Mutex;
 
 /// Longest text that the page may pass, bytes: many times the length of a link with all settings.
@@ -131,14 +134,15 @@ pub extern "C" fn range() -> bool {
     })
 }
 
-/// Runs the scenario; `with_dither` is false for the same motion without its dither.
+/// Runs the scenario; `suppressed` is false for the same motion without dither and feedback.
 // SAFETY: the only symbol of this name.
 #[unsafe(no_mangle)]
-pub extern "C" fn run(with_dither: bool) -> bool {
+pub extern "C" fn run(suppressed: bool) -> bool {
     answer(|interface| {
         let mut scenario = *interface.scenario()?;
-        if !with_dither {
-            scenario.dither.waveform = shared_model::dither::Waveform::None;
+        if !suppressed {
+            scenario.dither.waveform = Waveform::None;
+            scenario.controller.suppression = Suppression::None;
         }
         let motion = motion::run(&scenario)?;
         interface.set_motion(&motion);

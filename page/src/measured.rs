@@ -1,5 +1,6 @@
 //! The regime of the settled motion, by the measures of the host's programs.
 
+use crate::feedback;
 use crate::motion::{Motion, record};
 use measures::period::{RIPPLE_TOLERANCE, TOLERANCE, period, yaw_rate_maxima};
 use measures::{exponent, regime};
@@ -20,6 +21,8 @@ pub struct Measured {
     /// The regime in words; none if the motion leaves all bounds.
     regime: Option<String>,
     is_chaotic: bool,
+    /// Whether the motion has an exponent here: under delayed feedback it is not measured.
+    has_exponent: bool,
     /// The period in words.
     period: String,
     /// Largest Lyapunov exponent, 1/s.
@@ -43,6 +46,8 @@ pub struct Measured {
 /// If the page has no room for a motion of that length.
 pub fn measure(scenario: &Scenario<f32>) -> Result<(Measured, Motion), String> {
     let ((transient_s, observed_s), tolerance) = match scenario.dither.application {
+        // The steps of the PWM move the maxima a little.
+        _ if feedback::is_chosen(scenario) => (AVERAGED_S, RIPPLE_TOLERANCE),
         Application::Averaged => (AVERAGED_S, TOLERANCE),
         Application::Signal => (SIGNAL_S, RIPPLE_TOLERANCE),
     };
@@ -58,13 +63,17 @@ pub fn measure(scenario: &Scenario<f32>) -> Result<(Measured, Motion), String> {
         (String::new(), None, None)
     } else {
         let period = period(&trace, from, tolerance);
-        let exponent = exponent::largest(&longer.map(&f64::from), &trace, from);
+        // The linearised step has no delay.
+        let has_exponent = !feedback::is_chosen(scenario);
+        let exponent = || exponent::largest(&longer.map(&f64::from), &trace, from);
+        let exponent = has_exponent.then(exponent).flatten();
         let maxima = yaw_rate_maxima(&trace, from);
-        let kind = regime::kind(period, exponent, true, &maxima);
+        let kind = regime::kind(period, exponent, has_exponent, &maxima);
         (period.to_string(), exponent, Some(kind))
     };
     let measured = Measured {
         regime: kind.map(|kind| kind.to_string()),
+        has_exponent: !feedback::is_chosen(scenario),
         is_chaotic: kind.is_some_and(|kind| kind.is_chaotic()),
         period,
         exponent_per_s: exponent.map(|exponent| exponent.per_s),
@@ -76,7 +85,7 @@ pub fn measure(scenario: &Scenario<f32>) -> Result<(Measured, Motion), String> {
         leaves_bounds_at_s,
     };
     let drawn = (DRAWN_S / trace.step_s) as usize;
-    let first = trace.states.len().saturating_sub(drawn);
+    let first = from.max(trace.states.len().saturating_sub(drawn));
     Ok((measured, Motion::of(&longer, trace, first)))
 }
 
@@ -103,6 +112,17 @@ mod tests {
             let exponent = measured.exponent_per_s;
             assert_eq!(measured.is_chaotic, exponent.is_some_and(|e| e > 0.2));
         }
+    }
+
+    /// Without any of its transient.
+    #[test]
+    fn the_end_of_a_true_signals_motion_is_settled() {
+        let settings = "dither.waveform=sine&dither.amplitude_v=1&dither.application=signal";
+        let (measured, end) = measure(&scenario(settings).unwrap()).unwrap();
+        assert_eq!(measured.regime.as_deref(), Some("period-1"));
+        assert_eq!(end.states.len(), 600_000);
+        let greatest = end.states.iter().map(|state| state[1]).fold(0.0, f32::max);
+        assert!(greatest < 0.9, "{greatest} rad/s: without dither it is 1.8");
     }
 
     /// The usual sign of a vehicle's tyre force, which the paper does not have.

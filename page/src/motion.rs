@@ -1,9 +1,12 @@
-//! The motion that the page shows: the ECU's program in f32, step by step as on the target.
+//! The motion that the page shows: the ECU's program in open loop in f32, step by step as on the target; or the
+//! delayed feedback.
 
+use crate::feedback;
 use measures::trace::Trace;
 use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::open_loop::OpenLoop;
+use shared_model::policy::Suppression;
 use shared_model::servo::Pwm;
 
 /// Most model steps and PWM samples of a run: the browser keeps them all.
@@ -72,15 +75,23 @@ pub fn run(scenario: &Scenario<f32>) -> Result<Motion, String> {
 /// If it is not valid, or longer than the page has room for.
 pub fn record(scenario: &Scenario<f32>) -> Result<Trace, String> {
     check(scenario)?;
+    if feedback::is_chosen(scenario) {
+        return Ok(feedback::record(scenario));
+    }
     let mut program = OpenLoop::new(scenario).map_err(|error| error.to_string())?;
     Ok(Trace::record(&mut program, scenario))
 }
 
-/// Checks that the page has room for a run.
+/// Checks that the page can run a scenario.
 ///
 /// # Errors
-/// With the greatest length of a run.
+/// With the suppressions that it has, or the greatest length of a run.
 pub fn check(scenario: &Scenario<f32>) -> Result<(), String> {
+    if scenario.controller.suppression == Suppression::Both {
+        return Err(String::from(
+            "controller.suppression = both: the page has dither or delayed_feedback",
+        ));
+    }
     let run = &scenario.run;
     let by_steps_s = MOST_STEPS / f64::from(scenario.model_rate_hz());
     let longest_s = by_steps_s.min(MOST_SAMPLES / f64::from(run.pwm_rate_hz));
@@ -119,5 +130,7 @@ mod tests {
         scenario.run.duration_s = 401.0;
         let message = "run.duration_s = 401: the page has room for 400 s at these rates";
         assert_eq!(run(&scenario).err().as_deref(), Some(message));
+        scenario.controller.suppression = Suppression::Both;
+        assert!(run(&scenario).is_err_and(|error| error.contains("both")));
     }
 }

@@ -16,6 +16,7 @@ const NUMBERS = [
 const CHOICES = [
   { key: "dither.waveform", place: "dither", label: "Waveform", names: { none: "none", square: "square", sine: "sine" } },
   { key: "dither.application", place: "dither", label: "Applied as", names: { averaged: "mean", signal: "true signal" } },
+  { key: "controller.suppression", place: "dither", label: "Delayed feedback", names: { dither: "off", delayed_feedback: "on" } },
   { key: "friction.law", place: "friction", label: "Law", names: { coulomb_rate: "on the rate", printed_angle: "as printed", none: "none" } },
   { key: "friction.dithered", place: "friction", label: "Dithered", names: { false: "no", true: "yes" } },
   { key: "tires.model", place: "model", label: "Tyre", names: { cubic: "cubic", magic_formula: "Magic Formula" } },
@@ -24,6 +25,9 @@ const CHOICES = [
 
 /** Amplitudes of interest, V: the paper's volts are an angle, of another scale for each waveform. */
 const AMPLITUDES = { none: { to: 1.4, step: 0.005 }, square: { to: 0.2, step: 0.001 }, sine: { to: 1.4, step: 0.005 } };
+
+/** Whether the motor's torque suppresses the chaos, and no dither. */
+const hasFeedback = (scenario) => scenario.controller.suppression === "delayed_feedback";
 
 /** An element with attributes and children. */
 function element(name, attributes = {}, ...children) {
@@ -77,7 +81,7 @@ class Controls {
         const waveform = scenario.dither.waveform;
         slider.max = AMPLITUDES[waveform].to;
         slider.step = AMPLITUDES[waveform].step;
-        slider.disabled = field.disabled = waveform === "none";
+        slider.disabled = field.disabled = waveform === "none" || hasFeedback(scenario);
       }
       slider.value = value;
       slider.setAttribute("aria-valuetext", `${value} ${unit}`);
@@ -97,8 +101,11 @@ class Controls {
     });
     group.append(options);
     document.getElementById(place).append(group);
-    const set = (value) => {
-      for (const input of inputs) input.checked = input.value === value;
+    const set = (value, scenario) => {
+      for (const input of inputs) {
+        input.checked = input.value === value;
+        input.disabled = key.startsWith("dither.") && hasFeedback(scenario);
+      }
     };
     this.#fields.set(key, { field: group, set });
   }

@@ -23,9 +23,9 @@ class Model {
     return this.#call("range", key);
   }
 
-  /** Runs the scenario, with its dither or without. */
-  run(withDither = true) {
-    const facts = this.#call("run", "", withDither);
+  /** Runs the scenario, with its dither or feedback or without. */
+  run(suppressed = true) {
+    const facts = this.#call("run", "", suppressed);
     return { ...facts, states: this.#words(STATES, Float32Array), duties: this.#words(DUTIES, Uint16Array) };
   }
 

@@ -75,17 +75,20 @@ class Page {
     try {
       scenario = this.model.configure(text);
       run = this.model.run();
-      without = scenario.dither.waveform === "none" ? null : this.model.run(false);
+      const isSuppressed = hasFeedback(scenario) || scenario.dither.waveform !== "none";
+      without = isSuppressed ? this.model.run(false) : null;
     } catch (error) {
       return this.#refuse(error.message);
     }
     this.#refuse("");
     this.#settings = settings;
-    this.#shown = { text, scenario, run, without, settled: null };
+    const means = hasFeedback(scenario) ? "feedback" : "dither";
+    this.#shown = { text, scenario, means, run, without, settled: null };
     this.controls.show(scenario);
     this.plots.show(this.#shown);
     this.playback.setEnd(run.states.length / COMPONENTS * run.step_s);
     document.getElementById("legend").hidden = !without;
+    document.getElementById("means").textContent = means;
     for (const button of document.querySelectorAll("#presets button")) {
       button.setAttribute("aria-pressed", String(button.dataset.settings === textOf(settings)));
     }
@@ -120,7 +123,7 @@ class Page {
     document.getElementById("link").value = location.href;
   }
 
-  #showMeasured({ regime, is_chaotic, exponent_per_s, standard_error_per_s, threshold_per_s, observed_s, transient_s, leaves_bounds_at_s }) {
+  #showMeasured({ regime, is_chaotic, has_exponent, exponent_per_s, standard_error_per_s, threshold_per_s, observed_s, transient_s, leaves_bounds_at_s }) {
     if (leaves_bounds_at_s !== null) {
       const text = `The state leaves all bounds at ${leaves_bounds_at_s.toFixed(2)} s: the motion diverges, or the step is too long.`;
       return this.#report("Unbounded", text, "chaos");
@@ -131,7 +134,10 @@ class Page {
     const span = `Over ${observed_s} s after a transient of ${transient_s} s`;
     const word = regime[0].toUpperCase() + regime.slice(1);
     const kind = is_chaotic ? "chaos" : regime === "undecided" ? "unknown" : "regular";
-    if (exponent_per_s === null) return this.#report(word, "The largest Lyapunov exponent is not finite.", kind, `${span}.`);
+    if (exponent_per_s === null) {
+      const why = has_exponent ? "is not finite" : "is not measured under feedback";
+      return this.#report(word, `The largest Lyapunov exponent ${why}.`, kind, `${span}.`);
+    }
     const exponent = `Largest Lyapunov exponent ${number(exponent_per_s)} \u00b1 ${number(standard_error_per_s)} 1/s`;
     this.#report(word, exponent, kind, `${span}; positive from ${number(threshold_per_s, 3)} 1/s on.`);
   }

@@ -81,7 +81,7 @@ class Plots {
     const sheet = this.#response.context(this.#response.base);
     if (!sheet || !this.shown) return;
     const { context, width, height } = sheet;
-    const { run, without, scenario } = this.shown;
+    const { run, without, scenario, means } = this.shown;
     const font = width < 480 ? 12 : 13;
     const [left, right, gap, foot] = [54, width - 12, 30, 3.6 * font];
     const panel = (height - 24 - gap - foot) / 2;
@@ -96,7 +96,7 @@ class Plots {
         axes.line(Math.floor(count(one) / every), (k) => [(k * every + 1) * one.step_s, one.states[k * every * COMPONENTS + component]], style);
       if (without) line(without, this.#other(1.5));
       line(run, this.#main(without ? 1.8 : 1.4));
-      if (without) axes.instant(scenario.dither.start_time_s, row ? "" : "dither on", font);
+      if (without) axes.instant(scenario.dither.start_time_s, row ? "" : `${means} on`, font);
       return { axes, component, values };
     });
     const extent = ([low, high]) => `${low.toFixed(2)} to ${high.toFixed(2)}`;
@@ -186,7 +186,7 @@ class Plots {
     const sheet = this.#duty.context(this.#duty.base);
     if (!sheet || !this.shown) return;
     const { context, width, height } = sheet;
-    const { run, without, scenario } = this.shown;
+    const { run, without, scenario, means } = this.shown;
     const font = width < 480 ? 12 : 13;
     const period_ms = (1e3 * run.step_s) / run.samples_per_step;
     const start_ms = 1e3 * scenario.dither.start_time_s;
@@ -195,13 +195,13 @@ class Plots {
     const percent = (code) => (100 * code) / run.pwm_period;
     const values = Array.from(codes, percent);
     const axes = new Axes(context, [54, 24, width - 12, height - 3.6 * font], [DUTY_FROM_MS, DUTY_TO_MS], rangeAround(values, 2));
-    axes.draw({ x: without ? "time from the start of the dither (ms)" : `time from ${scenario.dither.start_time_s} s on (ms)`, y: "duty (%)", font });
+    axes.draw({ x: without ? `time from the start of the ${means} (ms)` : `time from ${scenario.dither.start_time_s} s on (ms)`, y: "duty (%)", font });
     const at = (k) => [(first + Math.ceil(k / 2)) * period_ms - start_ms, values[Math.floor(k / 2)]];
     axes.line(2 * values.length, at, this.#main(1.6));
     if (without) axes.instant(0, "", font);
     const [low, high] = rangeAround(values, 0);
     this.#duty.describe(
-      values.length ? `Duty of the PWM around the start of the dither, from ${Math.max(low, 0).toFixed(1)} to ${high.toFixed(1)} %` : "The run ends before the dither starts",
+      values.length ? `Duty of the PWM around the start of the ${means}, from ${Math.max(low, 0).toFixed(1)} to ${high.toFixed(1)} %` : "The run ends before that time",
     );
     document.getElementById("resolution").textContent = `${(1 / period_ms).toFixed(0)} kHz, 1 count = ${(1e3 * run.volts_per_count).toFixed(1)} mV`;
   }

@@ -1,6 +1,6 @@
 "use strict";
 
-/** The motions of the paper's figures; each is a link's settings. */
+/** The motions of the paper's figures, and the ECU's other suppression; each is a link's settings. */
 const PRESETS = [
   {
     name: "Chaos",
@@ -39,10 +39,10 @@ const PRESETS = [
     settings: "run.wheel_speed_rpm=1850",
   },
   {
-    name: "True signal",
+    name: "Feedback",
     where: "not in the paper",
-    text: "The sine of 1 V sampled at 10 kHz, not its mean.",
-    settings: "dither.waveform=sine&dither.amplitude_v=1&dither.application=signal",
+    text: "Delayed feedback of the yaw rate by the motor, from 3 s on.",
+    settings: "controller.suppression=delayed_feedback&run.duration_s=40",
   },
   {
     name: "As printed",

@@ -81,6 +81,15 @@ const steps = {
     assert.ok(pixels > 200, `${pixels} pixels`);
   },
 
+  async "delayed feedback holds an orbit"() {
+    const page = await open();
+    assert.equal(await changed(page, () => page.click("text=Feedback")), "Period-2");
+    assert.match(await page.textContent("#regime .exponent"), /not measured under feedback/);
+    assert.ok(await page.isDisabled('[id="dither.waveform-sine"]'));
+    const off = () => page.check('[id="controller.suppression-dither"]', { force: true });
+    assert.equal(await changed(page, off), "Chaos");
+  },
+
   async "the keyboard suffices"() {
     const page = await open();
     await page.keyboard.press("Tab");
