@@ -124,7 +124,7 @@ fn compiler_version() -> Result<String> {
 /// Builds the toolchain's folder beside its place, and moves it there when it is complete.
 fn build(target: &Target, pinned: &str, folder: &Path) -> Result<()> {
     println!(
-        "setup: building the libraries for {} into {} (half a minute)",
+        "setup: building the libraries for {} into {} (about a minute)",
         target.name,
         folder.display()
     );
