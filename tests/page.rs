@@ -1,4 +1,5 @@
-//! The page in a browser: what a user sees, and the bits of its model against the firmware's telemetry.
+//! The page in a browser: what a user sees, and the bits of its model against the firmware's
+//! telemetry.
 
 use dynamics::lyapunov;
 use dynamics::simulate::simulate;
@@ -15,7 +16,8 @@ use tests::{record_with, root};
 
 /// Greatest size of the page, bytes.
 const MOST_BYTES: u64 = 300_000;
-/// Greatest difference of the exponent in the browser from the host's: their logarithms differ in the last bit.
+/// Greatest difference of the exponent in the browser from the host's: their logarithms differ in
+/// the last bit.
 const EXPONENT_TOLERANCE_PER_S: f64 = 1e-9;
 
 fn target() -> PathBuf {
@@ -33,7 +35,8 @@ fn page() -> PathBuf {
     page
 }
 
-/// Node.js, Chromium and their driver, as set-up installs them; `None` with a message where they are missing.
+/// Node.js, Chromium and their driver, as set-up installs them; `None` with a message where they
+/// are missing.
 fn browser() -> Option<[PathBuf; 3]> {
     let folder = target().join("browser");
     let tools = ["node", "chromium", "package.json"].map(|name| folder.join(name));

@@ -1,5 +1,5 @@
-//! The ECU's controller with its delayed feedback, in closed loop with the vehicle: sensors without errors, no frames
-//! and no gate.
+//! The ECU's controller with its delayed feedback, in closed loop with the vehicle: sensors without
+//! errors, no frames and no gate.
 
 use measures::trace::Trace;
 use shared_model::controller::Controller;
@@ -15,8 +15,8 @@ pub fn is_chosen(scenario: &Scenario<f32>) -> bool {
     scenario.controller.suppression == Suppression::DelayedFeedback
 }
 
-/// Records a run of a scenario, which must be valid: a state per control tick. The vehicle is stepped at the PWM rate,
-/// and the duty is held over a tick.
+/// Records a run of a scenario, which must be valid: a state per control tick. The vehicle is
+/// stepped at the PWM rate, and the duty is held over a tick.
 pub fn record(scenario: &Scenario<f32>) -> Trace {
     let run = &scenario.run;
     let periods = scenario.periods_per_tick();

@@ -77,7 +77,8 @@ fn answer<A: Serialize>(call: impl FnOnce(&mut Interface) -> Result<A, String>) 
     is_ok
 }
 
-/// Address of a place for a text of `length` bytes, the input of the next call; null if it is too long.
+/// Address of a place for a text of `length` bytes, the input of the next call; null if it is too
+/// long.
 // SAFETY: the only symbol of this name.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(length: usize) -> *mut u8 {
@@ -112,7 +113,8 @@ pub extern "C" fn output_length(number: usize) -> usize {
     interface.outputs.get(number).map_or(0, Vec::len)
 }
 
-/// Makes the scenario of the settings in the input, and answers with it. On an error the last scenario stays.
+/// Makes the scenario of the settings in the input, and answers with it. On an error the last
+/// scenario stays.
 // SAFETY: the only symbol of this name.
 #[unsafe(no_mangle)]
 pub extern "C" fn configure() -> bool {
@@ -150,7 +152,8 @@ pub extern "C" fn run(suppressed: bool) -> bool {
     })
 }
 
-/// Measures period, exponent and regime of the settled motion; the states are then those of its end.
+/// Measures period, exponent and regime of the settled motion; the states are then those of its
+/// end.
 // SAFETY: the only symbol of this name.
 #[unsafe(no_mangle)]
 pub extern "C" fn measure() -> bool {

@@ -8,7 +8,8 @@ use serde::Serialize;
 use shared_model::Scenario;
 use shared_model::dither::Application;
 
-/// Initial transient to discard, from the start of the dither on, and length of the motion measured, s.
+/// Initial transient to discard, from the start of the dither on, and length of the motion
+/// measured, s.
 const AVERAGED_S: (f32, f32) = (100.0, 200.0);
 /// The same where the model is stepped at the PWM rate.
 const SIGNAL_S: (f32, f32) = (20.0, 60.0);

@@ -1,5 +1,5 @@
-//! The motion that the page shows: the ECU's program in open loop in f32, step by step as on the target; or the
-//! delayed feedback.
+//! The motion that the page shows: the ECU's program in open loop in f32, step by step as on the
+//! target; or the delayed feedback.
 
 use crate::feedback;
 use measures::trace::Trace;

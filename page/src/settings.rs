@@ -2,8 +2,8 @@
 
 use shared_model::Scenario;
 
-/// The scenario of the settings `preset=NAME` and `section.name=value`, joined by `&`, as the ECU takes them; those of
-/// the preset `reconstruction` hold for the rest.
+/// The scenario of the settings `preset=NAME` and `section.name=value`, joined by `&`, as the ECU
+/// takes them; those of the preset `reconstruction` hold for the rest.
 ///
 /// # Errors
 /// The first setting that is not one, or the first number that is not allowed.

@@ -1,5 +1,5 @@
-//! A browser for the test of the page: Chromium, Node.js, and the npm package that drives the one from the
-//! other, which is installed below target/.
+//! A browser for the test of the page: Chromium, Node.js, and the npm package that drives the one
+//! from the other, which is installed below target/.
 
 use std::fmt;
 use std::fs;

@@ -1,8 +1,8 @@
 //! A target built from Debian's Rust packages, for machines where rustup cannot download.
 //!
-//! Debian's compiler comes with the source of its libraries. Their part that the target's programs need
-//! is built once, into a folder that rustup links as one more toolchain. rustup's own toolchains do
-//! not change.
+//! Debian's compiler comes with the source of its libraries. Their part that the target's programs
+//! need is built once, into a folder that rustup links as one more toolchain. rustup's own
+//! toolchains do not change.
 
 use std::env;
 use std::fs::{self, Permissions};

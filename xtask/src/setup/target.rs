@@ -1,5 +1,5 @@
-//! The compiler's targets beside the host: from rustup, or where rustup cannot download, from Debian's
-//! packages.
+//! The compiler's targets beside the host: from rustup, or where rustup cannot download, from
+//! Debian's packages.
 
 use std::time::Duration;
 
@@ -44,7 +44,8 @@ pub fn ensure(target: &Target) -> Result<String> {
     Ok(toolchain.to_owned())
 }
 
-/// Lets plain `cargo` in firmware/ use the toolchain that builds the firmware, where it is not the pinned one.
+/// Lets plain `cargo` in firmware/ use the toolchain that builds the firmware, where it is not the
+/// pinned one.
 pub fn use_for_firmware(toolchain: &str) -> Result<()> {
     if toolchain == rustup::require_pinned()? {
         return Ok(());

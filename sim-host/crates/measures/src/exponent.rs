@@ -1,8 +1,9 @@
 //! The largest Lyapunov exponent along recorded states, with its statistical error.
 //!
-//! A tangent vector is carried along by the linearised step: dual numbers through the integrator itself, so with the
-//! right jumps at friction events; stick takes one dimension away. The mean rate of its growth is the exponent. Any
-//! recorded motion will do, the telemetry of the firmware too.
+//! A tangent vector is carried along by the linearised step: dual numbers through the integrator
+//! itself, so with the right jumps at friction events; stick takes one dimension away. The mean
+//! rate of its growth is the exponent. Any recorded motion will do, the telemetry of the firmware
+//! too.
 
 use crate::dual::Dual;
 use crate::period::yaw_rate_maxima;
@@ -30,8 +31,8 @@ pub struct Exponent {
     /// Standard error, 1/s; it takes the correlation of successive segments of the motion into
     /// account.
     pub standard_error_per_s: f64,
-    /// The least rate that the motion's length can distinguish from zero, 1/s: the most that the vector
-    /// stretches beyond the mean within one cycle, and at least one e-fold, over the whole
+    /// The least rate that the motion's length can distinguish from zero, 1/s: the most that the
+    /// vector stretches beyond the mean within one cycle, and at least one e-fold, over the whole
     /// length.
     pub resolution_per_s: f64,
     /// Length of the motion that it is taken over, s.
@@ -69,9 +70,9 @@ impl Exponent {
 }
 
 /// Variance of the sum of a correlated sequence of mean zero: prewhitened by a first-order
-/// autoregression, then with Bartlett weights. D. W. K. Andrews, J. C. Monahan, Econometrica 60 (1992)
-/// 953. The greater of two, with as many lags as the root of the length and as its power 2/3: the first
-/// misses the laminar phases of intermittent chaos, the second scatters more.
+/// autoregression, then with Bartlett weights. D. W. K. Andrews, J. C. Monahan, Econometrica 60
+/// (1992) 953. The greater of two, with as many lags as the root of the length and as its power
+/// 2/3: the first misses the laminar phases of intermittent chaos, the second scatters more.
 fn long_run_variance_sum(sequence: &[f64]) -> f64 {
     let covariance =
         |x: &[f64], lag: usize| -> f64 { x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum() };

@@ -24,7 +24,8 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Runs a scenario's program from its present state on, for the length of the scenario, and records it.
+    /// Runs a scenario's program from its present state on, for the length of the scenario, and
+    /// records it.
     pub fn record<T: Real>(ecu: &mut OpenLoop<T>, scenario: &Scenario<T>) -> Self {
         let steps = scenario.steps() as usize;
         let samples_per_step = scenario.samples_per_step() as usize;
