@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use tests::golden::check_text;
 use tests::root;
 
-const CRATES: [&str; 6] = [
+const CRATES: [&str; 7] = [
     "benches/c-reference",
     "shared-model",
     "firmware",
+    "page",
     "sim-host",
     "tests",
     "xtask",

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use crate::setup::{probe, python, qemu, target};
+use crate::setup::{browser, probe, python, qemu, target};
 use crate::{rustup, workspace};
 
 /// A required tool.
@@ -14,7 +14,15 @@ struct Item {
 
 /// Prints the table; an error if something is missing.
 pub fn run() -> Result<()> {
-    let items = [toolchain()?, target()?, qemu(), runner()?, python()?];
+    let items = [
+        toolchain()?,
+        compiler_target(&probe::FIRMWARE)?,
+        compiler_target(&probe::BROWSER)?,
+        qemu(),
+        runner()?,
+        python()?,
+        browser()?,
+    ];
     let width = items
         .iter()
         .map(|item| item.need.len())
@@ -50,18 +58,18 @@ fn toolchain() -> Result<Item> {
     })
 }
 
-fn target() -> Result<Item> {
+fn compiler_target(target: &probe::Target) -> Result<Item> {
     let pinned = workspace::pinned_channel()?;
     let state = if rustup::rustc_version(&pinned).is_none() {
         Err(format!("needs Rust {pinned} first"))
     } else {
-        match target::toolchain(&pinned)? {
+        match target::toolchain(target, &pinned)? {
             Some(toolchain) => Ok(format!("builds with toolchain {toolchain}")),
-            None => Err(format!("set-up would: {}", target::plan(&pinned)?)),
+            None => Err(format!("set-up would: {}", target::plan(target, &pinned)?)),
         }
     };
     Ok(Item {
-        need: probe::TARGET.to_owned(),
+        need: target.name.to_owned(),
         state,
     })
 }
@@ -94,6 +102,17 @@ fn python() -> Result<Item> {
     };
     Ok(Item {
         need: "Python packages of the tests".to_owned(),
+        state,
+    })
+}
+
+fn browser() -> Result<Item> {
+    let state = match browser::found()? {
+        Some(found) => Ok(found.to_string()),
+        None => Err(browser::plan()),
+    };
+    Ok(Item {
+        need: "browser of the page's test".to_owned(),
         state,
     })
 }

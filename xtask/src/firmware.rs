@@ -6,7 +6,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result};
 
-use crate::setup::probe::TARGET;
+use crate::setup::probe::FIRMWARE;
 use crate::{process, rustup, workspace};
 
 /// The default board. Its images are where a plain `cargo build` puts them.
@@ -139,7 +139,7 @@ pub fn elf(board: &str, image: &str) -> Result<PathBuf> {
 }
 
 fn output(target_dir: &Path, image: &str) -> PathBuf {
-    target_dir.join(TARGET).join("firmware").join(image)
+    target_dir.join(FIRMWARE.name).join("firmware").join(image)
 }
 
 /// The usual board has the usual folder; all others share one, so that a board costs the packages of

@@ -57,6 +57,17 @@ impl Manager {
         }
     }
 
+    /// The one line to type for the browser of the page's test.
+    pub fn browser_line(self) -> &'static str {
+        match self {
+            Self::Apt => {
+                "sudo apt-get update && sudo apt-get install --no-install-recommends chromium nodejs npm"
+            }
+            Self::Dnf => "sudo dnf install chromium nodejs npm",
+            Self::Pacman => "sudo pacman -S chromium nodejs npm",
+        }
+    }
+
     /// The one line to type for QEMU.
     pub fn qemu_line(self) -> &'static str {
         match self {
@@ -211,6 +222,7 @@ mod tests {
                 manager.qemu_line(),
                 manager.python_line(),
                 manager.arm_gcc_line(),
+                manager.browser_line(),
             ] {
                 assert!(line.contains(manager.program()), "{manager:?}");
             }

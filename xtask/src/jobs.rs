@@ -7,6 +7,7 @@ pub mod fuzz;
 pub mod lint;
 pub mod mutants;
 pub mod package;
+pub mod page;
 pub mod proofs;
 pub mod setup;
 pub mod target_cost;

@@ -54,7 +54,8 @@ enum Command {
     /// from rustup, or where rustup cannot download, from Debian's Rust packages; QEMU comes
     /// from the system's packages. The runner is the program that `cargo run` in firmware/
     /// starts. Python packages for the tests go into target/python; the system's Python is not
-    /// changed.
+    /// changed. The page's test takes Chromium and Node.js from the system's packages; their driver goes
+    /// into target/browser.
     #[command(
         after_help = "Example:\n  cargo xtask setup && cd firmware && cargo run --profile firmware --bin bench"
     )]
@@ -117,6 +118,12 @@ enum Command {
         board: String,
     },
 
+    /// Builds the page for the browser, target/page/index.html: the model, its plots and its regimes in one file.
+    ///
+    /// The compiler's target comes from rustup, or where rustup cannot download, from Debian's Rust packages.
+    #[command(after_help = "Example:\n  cargo xtask page && xdg-open target/page/index.html")]
+    Page,
+
     /// Packs every publishable package, and builds each from its package alone. Publishes nothing.
     #[command(after_help = "Example:\n  cargo xtask package")]
     Package,
@@ -164,6 +171,7 @@ fn main() -> ExitCode {
         Command::TargetCost { overwrite_expected } => jobs::target_cost::run(overwrite_expected),
         Command::Lint => jobs::lint::run(),
         Command::Firmware { board } => jobs::firmware::run(&board),
+        Command::Page => jobs::page::run(),
         Command::Package => jobs::package::run(),
         Command::Coverage => jobs::coverage::run(),
         Command::Mutants => jobs::mutants::run(),

@@ -1,5 +1,6 @@
-//! Prepares this machine: the compiler's target, QEMU, and for the tests Python packages.
+//! Prepares this machine: the compiler's targets, QEMU, and for the tests Python packages and a browser.
 
+pub mod browser;
 mod debian;
 pub mod probe;
 pub mod python;
@@ -11,7 +12,8 @@ use anyhow::Result;
 /// Installs the missing tools that build and run the firmware, and returns the toolchain that
 /// builds the firmware.
 pub fn tools() -> Result<String> {
-    let toolchain = target::ensure()?;
+    let toolchain = target::ensure(&probe::FIRMWARE)?;
+    target::use_for_firmware(&toolchain)?;
     qemu::ensure()?;
     Ok(toolchain)
 }

@@ -5,6 +5,7 @@ use super::outcome::Outcome;
 use super::output::check;
 use anyhow::bail;
 use dynamics::simulate::{early_end, simulate};
+use dynamics::trace_csv;
 use dynamics::words::counted;
 use files::output;
 use std::path::PathBuf;
@@ -44,7 +45,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         bail!("{end}; no file was written. {}", advice(end.reason));
     }
     output::write(&arguments.out, arguments.force, |to| {
-        Ok(trace.write_csv(to)?)
+        Ok(trace_csv::write_csv(&trace, to)?)
     })?;
     say!(
         "{} over {} s in {}",

@@ -18,11 +18,11 @@ pub fn run(board: &str) -> Result<()> {
         None => bail!("no board {board}: choose {} or {ALL}", known.join(", ")),
     };
     let pinned = rustup::require_pinned()?;
-    let toolchain = setup::target::toolchain(&pinned)?;
+    let toolchain = setup::target::toolchain(&setup::probe::FIRMWARE, &pinned)?;
     let toolchain = toolchain.with_context(|| {
         format!(
             "{} is missing: run `cargo xtask setup`",
-            setup::probe::TARGET
+            setup::probe::FIRMWARE.name
         )
     })?;
     for board in &chosen {

@@ -16,10 +16,10 @@ pub fn run() -> Result<()> {
     stage("clippy on the host's packages", || host(&pinned))?;
     stage("API documentation", || documentation(&pinned))?;
     // Only the pinned toolchain has a clippy.
-    if setup::target::toolchain(&pinned)?.as_ref() != Some(&pinned) {
+    if setup::target::toolchain(&setup::probe::FIRMWARE, &pinned)?.as_ref() != Some(&pinned) {
         bail!(
             "format and host are clean, but the firmware is not linted: {}",
-            setup::target::missing(&pinned)
+            setup::target::missing(&setup::probe::FIRMWARE, &pinned)
         );
     }
     for board in firmware::boards()? {

@@ -7,7 +7,7 @@ use crate::outcome::Exit;
 use crate::{process, rustup, workspace};
 
 /// Packages that are of no use outside this checkout; their manifests forbid to publish them.
-const OWN: [&str; 4] = ["c-reference", "firmware", "tests", "xtask"];
+const OWN: [&str; 5] = ["c-reference", "firmware", "page", "tests", "xtask"];
 
 /// Packs all others and builds each from its package: four minutes on two cores.
 pub fn run() -> Result<()> {

@@ -11,6 +11,10 @@ pub fn run() -> Result<()> {
     stage("runner", build_sim_host)?;
     // Last: without these only a test is missing.
     stage("Python packages of the tests", setup::python::ensure)?;
+    stage("target of the page", || {
+        setup::target::ensure(&setup::probe::BROWSER)
+    })?;
+    stage("browser of the page's test", setup::browser::ensure)?;
     println!(
         "the firmware builds with toolchain {toolchain}; its runner is {}",
         workspace::sim_host()?.display()

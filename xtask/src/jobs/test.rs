@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 
-use super::{proofs, stage, target_cost};
+use super::{page, proofs, stage, target_cost};
 use crate::outcome::Exit;
 use crate::{process, rustup, setup, workspace};
 
@@ -16,7 +16,13 @@ pub fn run() -> Result<()> {
     let toolchain = stage("set-up", setup::tools)?;
     // Before any test: a comparison that would be left out is no pass.
     stage("Python packages of the tests", setup::python::ensure)?;
+    let for_browser = stage("target of the page", || {
+        setup::target::ensure(&setup::probe::BROWSER)
+    })?;
+    // Not every machine has a browser.
+    let browser = stage("browser of the page's test", setup::browser::ensure);
     proofs::build(&toolchain)?;
+    page::build(&for_browser)?;
     if target_cost::has_c_compiler() {
         target_cost::build(&toolchain)?;
     }
@@ -29,6 +35,9 @@ pub fn run() -> Result<()> {
     println!(
         "passed: the panic-free proof of the firmware for every board, the model's tests with overflow checks, all tests in release"
     );
+    if let Err(error) = browser {
+        println!("   UNTESTED: the page in a browser: {error:#}");
+    }
     println!("   slow proofs, not run: cargo xtask package, mutants, coverage, fuzz");
     Ok(())
 }

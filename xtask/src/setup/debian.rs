@@ -1,8 +1,8 @@
-//! The target built from Debian's Rust packages, for machines where rustup cannot download.
+//! A target built from Debian's Rust packages, for machines where rustup cannot download.
 //!
-//! Debian's compiler comes with the source of its libraries. Their part that the firmware needs is
-//! built once, into a folder that rustup links as one more toolchain. rustup's own toolchains do
-//! not change.
+//! Debian's compiler comes with the source of its libraries. Their part that the target's programs
+//! need is built once, into a folder that rustup links as one more toolchain. rustup's own
+//! toolchains do not change.
 
 use std::env;
 use std::fs::{self, Permissions};
@@ -12,62 +12,62 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use super::probe::{TARGET, builds};
+use super::probe::{Target, builds};
 use crate::host::{self, Apt};
 use crate::{process, rustup, workspace};
 
-/// The toolchain's name in rustup.
-pub const TOOLCHAIN: &str = "dithersteer-thumb";
 const PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 const RUSTC: &str = "/usr/bin/rustc";
 const CARGO: &str = "/usr/bin/cargo";
 
 /// The steps of set-up.
-pub fn plan() -> String {
+pub fn plan(target: &Target) -> String {
     format!(
-        "Debian's {} and a toolchain {TOOLCHAIN} made of them",
-        PACKAGES.join(" ")
+        "Debian's {} and a toolchain {} made of them",
+        PACKAGES.join(" "),
+        target.debian_toolchain
     )
 }
 
 /// Installs the packages, builds the libraries and links the toolchain, each unless it is done
 /// already.
-pub fn install(pinned: &str) -> Result<()> {
+pub fn install(target: &Target, pinned: &str) -> Result<()> {
     install_packages(pinned)?;
-    let folder = folder()?;
+    let folder = folder(target)?;
     // The libraries may exist without being linked, or may belong to an older compiler.
-    if !builds(Command::new(folder.join("bin/rustc")))? {
-        build(pinned, &folder)?;
+    if !builds(target, Command::new(folder.join("bin/rustc")))? {
+        build(target, pinned, &folder)?;
     }
     println!(
-        "setup: linking {} into rustup as {TOOLCHAIN}",
-        folder.display()
+        "setup: linking {} into rustup as {}",
+        folder.display(),
+        target.debian_toolchain
     );
     process::run(
         rustup::rustup()?
-            .args(["toolchain", "link", TOOLCHAIN])
+            .args(["toolchain", "link", target.debian_toolchain])
             .arg(&folder),
     )
 }
 
-/// Lets plain `cargo` in firmware/ use the toolchain, unless it does already.
-pub fn use_in_firmware_folder() -> Result<()> {
+/// Lets plain `cargo` in firmware/ use a toolchain, unless it does already.
+pub fn use_in_firmware_folder(toolchain: &str) -> Result<()> {
     let firmware = workspace::firmware();
     let active = process::capture(
         rustup::rustup()?
             .args(["show", "active-toolchain"])
             .current_dir(&firmware),
     );
-    if active.is_some_and(|line| line.split_whitespace().next() == Some(TOOLCHAIN)) {
+    if active.is_some_and(|line| line.split_whitespace().next() == Some(toolchain)) {
         return Ok(());
     }
     println!(
-        "setup: a rustup override lets cargo in {} use {TOOLCHAIN}",
+        "setup: a rustup override lets cargo in {} use {toolchain}",
         firmware.display()
     );
     process::run(
         rustup::rustup()?
-            .args(["override", "set", TOOLCHAIN, "--path"])
+            .args(["override", "set", toolchain, "--path"])
             .arg(&firmware),
     )
 }
@@ -105,7 +105,7 @@ fn install_packages(pinned: &str) -> Result<()> {
 }
 
 /// Where the toolchain lies.
-fn folder() -> Result<PathBuf> {
+fn folder(target: &Target) -> Result<PathBuf> {
     let data = env::var_os("XDG_DATA_HOME")
         .map(PathBuf::from)
         .filter(|folder| folder.is_absolute());
@@ -113,7 +113,7 @@ fn folder() -> Result<PathBuf> {
     Ok(data
         .context("neither XDG_DATA_HOME nor HOME is set")?
         .join("dithersteer")
-        .join("debian-thumb"))
+        .join(target.debian_folder))
 }
 
 fn compiler_version() -> Result<String> {
@@ -122,9 +122,10 @@ fn compiler_version() -> Result<String> {
 }
 
 /// Builds the toolchain's folder beside its place, and moves it there when it is complete.
-fn build(pinned: &str, folder: &Path) -> Result<()> {
+fn build(target: &Target, pinned: &str, folder: &Path) -> Result<()> {
     println!(
-        "setup: building the libraries for {TARGET} into {} (half a minute)",
+        "setup: building the libraries for {} into {} (about a minute)",
+        target.name,
         folder.display()
     );
     let work = folder.with_extension("new");
@@ -132,15 +133,15 @@ fn build(pinned: &str, folder: &Path) -> Result<()> {
         // From an interrupted set-up.
         fs::remove_dir_all(&work).with_context(|| format!("cannot remove {}", work.display()))?;
     }
-    let libraries = build_libraries(&work)?;
+    let libraries = build_libraries(target, &work)?;
     let new = work.join("toolchain");
-    assemble(pinned, &libraries, &new, folder)?;
+    assemble(target, pinned, &libraries, &new, folder)?;
     replace(&new, folder)?;
     fs::remove_dir_all(&work).with_context(|| format!("cannot remove {}", work.display()))
 }
 
-/// Compiles core and alloc from Debian's source, and returns the folder they end up in.
-fn build_libraries(work: &Path) -> Result<PathBuf> {
+/// Compiles the target's libraries from Debian's source, and returns the folder they end up in.
+fn build_libraries(target: &Target, work: &Path) -> Result<PathBuf> {
     let sysroot = process::capture(Command::new(RUSTC).args(["--print", "sysroot"]));
     let sysroot = PathBuf::from(sysroot.with_context(|| format!("{RUSTC} does not run"))?);
     let vendored = sysroot.join("lib/rustlib/src/rust/library/vendor");
@@ -163,16 +164,11 @@ fn build_libraries(work: &Path) -> Result<PathBuf> {
         "source.vendored.directory='{}'",
         vendored.display()
     ));
-    cargo.args([
-        "build",
-        "--release",
-        "--target",
-        TARGET,
-        "-Zbuild-std=core,alloc",
-    ]);
+    cargo.args(["build", "--release", "--target", target.name]);
+    cargo.arg(format!("-Zbuild-std={}", target.libraries));
     cargo.arg("-Zbuild-std-features=compiler-builtins-mem");
     // An own cargo home, so that the user's configuration does not apply; bitcode, so that the
-    // firmware can use LTO.
+    // programs can use LTO.
     cargo
         .env("CARGO_HOME", work.join("cargo-home"))
         .env("CARGO_TARGET_DIR", work.join("target"));
@@ -189,19 +185,25 @@ fn build_libraries(work: &Path) -> Result<PathBuf> {
         cargo.env_remove(variable);
     }
     process::run(&mut cargo)?;
-    Ok(work.join("target").join(TARGET).join("release/deps"))
+    Ok(work.join("target").join(target.name).join("release/deps"))
 }
 
 /// Puts a toolchain together: the new libraries, Debian's own for build scripts and macros,
 /// rustup's linker.
-fn assemble(pinned: &str, libraries: &Path, new: &Path, place: &Path) -> Result<()> {
+fn assemble(
+    target: &Target,
+    pinned: &str,
+    libraries: &Path,
+    new: &Path,
+    place: &Path,
+) -> Result<()> {
     let version = compiler_version()?;
     let host = version
         .lines()
         .find_map(|line| line.strip_prefix("host: "))
         .context("rustc names no host")?;
     let rustlib = new.join("lib/rustlib");
-    let for_target = rustlib.join(TARGET).join("lib");
+    let for_target = rustlib.join(target.name).join("lib");
     fs::create_dir_all(&for_target)?;
     for entry in fs::read_dir(libraries)? {
         let entry = entry?;

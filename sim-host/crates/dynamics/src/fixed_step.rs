@@ -4,11 +4,12 @@
 use crate::component::Component;
 use crate::extrema::Extrema;
 use crate::flow::VehicleFlow;
-use crate::lyapunov::{self, SEGMENTS, WARM_UP};
+use crate::lyapunov::{self, SEGMENTS};
 use crate::section::{Direction, Section, Step};
 use crate::sweep::Timing;
 use engine::Stepper;
 use engine::taylor::{Crossing, Observables, Trajectory};
+use measures::exponent::WARM_UP;
 use shared_model::vehicle::State;
 use shared_model::{InvalidScenario, Scenario};
 

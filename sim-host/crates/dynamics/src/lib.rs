@@ -21,7 +21,6 @@ pub mod method;
 mod module_comment;
 pub mod observe;
 pub mod orbit;
-pub mod period;
 pub mod poincare;
 pub mod power_spectrum;
 pub mod realisability;
@@ -32,6 +31,8 @@ mod settled;
 pub mod simulate;
 pub mod sweep;
 pub mod synchronisation;
-pub mod trace;
+pub mod trace_csv;
 pub mod two_particle;
 pub mod words;
+
+pub use measures::{period, trace};

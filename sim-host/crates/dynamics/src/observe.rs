@@ -1,10 +1,11 @@
 //! What motions do after their transients: by the engine, many side by side.
 
 use crate::fixed_step;
-use crate::lyapunov::{SEGMENTS, WARM_UP};
+use crate::lyapunov::SEGMENTS;
 use crate::sweep::{RunControl, Timing};
 use engine::taylor::{Compiled, Ensemble, Observables, Span, Tangents, Trajectory, Unsupported};
 use engine::{Reason, Stepper};
+use measures::exponent::WARM_UP;
 use shared_model::friction::Sign;
 use shared_model::{InvalidScenario, Scenario};
 

@@ -40,13 +40,13 @@ pub trait Compiled: Real {
 
 impl Compiled for f32 {
     fn simulate(scenario: &Scenario<f32>) -> Result<Trace, InvalidScenario> {
-        Ok(motion(&mut OpenLoop::new(scenario)?, scenario))
+        Ok(Trace::record(&mut OpenLoop::new(scenario)?, scenario))
     }
 }
 
 impl Compiled for f64 {
     fn simulate(scenario: &Scenario<f64>) -> Result<Trace, InvalidScenario> {
-        Ok(motion(&mut OpenLoop::new(scenario)?, scenario))
+        Ok(Trace::record(&mut OpenLoop::new(scenario)?, scenario))
     }
 }
 
@@ -112,28 +112,7 @@ pub fn early_end(scenario: &Scenario<f64>, trace: &Trace) -> Option<EarlyEnd> {
 
 /// Records the motion of a scenario from the program's present state on, for the scenario's length.
 pub fn record(ecu: &mut OpenLoop<f64>, scenario: &Scenario<f64>) -> Trace {
-    motion(ecu, scenario)
-}
-
-fn motion<T: Real>(ecu: &mut OpenLoop<T>, scenario: &Scenario<T>) -> Trace {
-    let steps = scenario.steps() as usize;
-    let samples_per_step = scenario.samples_per_step() as usize;
-    let initial = ecu.control.state().map(Real::to_f64);
-    let mut states = Vec::with_capacity(steps);
-    let mut duties = Vec::with_capacity(steps * samples_per_step);
-    for _ in 0..steps {
-        interrupt::check();
-        let state = ecu.step(|duty| duties.push(duty.code()));
-        states.push(state.map(Real::to_f64));
-    }
-    Trace {
-        step_s: 1.0 / scenario.model_rate_hz().to_f64(),
-        initial,
-        states,
-        duties,
-        samples_per_step,
-        pwm_period: ecu.pwm.neutral().period(),
-    }
+    Trace::record(ecu, scenario)
 }
 
 /// State after `time_s` of the scenario's motion without dither: a start on the attractor.

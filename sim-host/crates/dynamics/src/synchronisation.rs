@@ -11,7 +11,7 @@
 //! y = x + (y - x) exp(-d h), which is exact for the coupling.
 
 use crate::flow::{Flow, Unmeasured, VehicleFlow, check, steps};
-use crate::lyapunov::{Exponent, WARM_UP};
+use measures::exponent::{Exponent, WARM_UP};
 use nalgebra::{SVector, Vector2, Vector4};
 use shared_model::friction::FrictionMode;
 use shared_model::vehicle::{STEERING_ANGLE, STEERING_RATE};

@@ -8,9 +8,9 @@
 //! to trial instants, and the motion continues from there in the new mode. What the ECU's fixed step
 //! makes of the same motion is compared against it.
 
-use crate::dual::Dual;
-use crate::early_end::{EarlyEnd, Reason, is_bounded};
 use crate::events::{Guard, next_mode};
+use measures::dual::Dual;
+use measures::{EarlyEnd, Reason, is_bounded};
 use nalgebra::Vector4;
 use shared_model::dither::{Application, Injection};
 use shared_model::friction::FrictionMode;

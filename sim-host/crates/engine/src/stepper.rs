@@ -1,7 +1,7 @@
 //! Fixed-step integration of the averaged vehicle model, without PWM and telemetry.
 
-use crate::early_end::{EarlyEnd, is_bounded};
 use crate::reference::why_unbounded;
+use measures::{EarlyEnd, is_bounded};
 use shared_model::dither::{Application, Injection};
 use shared_model::vehicle::{Model, State};
 use shared_model::{InvalidScenario, Real, Scenario, integrate};

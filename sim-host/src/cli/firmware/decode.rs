@@ -2,6 +2,7 @@
 
 use crate::cli::outcome::Outcome;
 use crate::cli::output::{check, named};
+use dynamics::trace_csv;
 use dynamics::words::counted;
 use files::output;
 use pil::equivalence::trace_of;
@@ -46,7 +47,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     );
     if let Some(out) = &arguments.out {
         let trace = trace_of(&recording);
-        output::write(out, arguments.force, |to| Ok(trace.write_csv(to)?))?;
+        output::write(out, arguments.force, |to| {
+            Ok(trace_csv::write_csv(&trace, to)?)
+        })?;
     }
     Ok(Outcome::Success)
 }

@@ -1,13 +1,14 @@
 //! What is found in a cell of the map.
 
 use super::plan::{Place, Plan, Start};
-use crate::attractor::{self, kind};
+use crate::attractor;
 use crate::lyapunov::largest_of;
 use crate::observe::follow;
 use crate::period::{Period, TOLERANCE, maxima_of_turns, period_of_maxima};
 use crate::sweep::Timing;
 use engine::Reason;
 use engine::taylor::{Observables, Trajectory, Unsupported};
+use measures::regime::kind;
 use serde::{Deserialize, Serialize};
 use shared_model::dither::Waveform;
 use shared_model::vehicle::{STEERING_ANGLE, YAW_RATE};

@@ -1,6 +1,6 @@
 //! Observables of a trajectory, and the span over which they are taken.
 
-use crate::early_end::EarlyEnd;
+use measures::EarlyEnd;
 use shared_model::vehicle::State;
 
 /// What is looked at on the way, beside the end. Each costs some percent.

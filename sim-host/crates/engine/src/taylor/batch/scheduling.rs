@@ -1,11 +1,12 @@
 //! Motions get on, take turns, come to their ends and get off.
 
 use super::{Batch, greatest};
-use crate::early_end::{BOUND, Reason};
 use crate::taylor::equation::Equation;
 use crate::taylor::lanes::Lanes;
 use crate::taylor::queue::{LaneData, Waiting};
 use crate::taylor::series::Series;
+use measures::Reason;
+use measures::early_end::BOUND;
 use pulp::Simd;
 use shared_model::vehicle::State;
 

@@ -4,7 +4,7 @@ use nalgebra::Vector4;
 use shared_model::Real;
 
 /// Angles (rad) and rates (rad/s) beyond this are no motion of a vehicle.
-pub(crate) const BOUND: f64 = 1e3;
+pub const BOUND: f64 = 1e3;
 
 /// Whether a state vector is one of a vehicle at all: finite, and within any bounds that one could
 /// keep.

@@ -4,7 +4,7 @@
 use crate::trace::Trace;
 use shared_model::vehicle::YAW_RATE;
 
-/// Highest period that is told from chaos.
+/// Highest period that is distinguished from chaos.
 const MAX_PERIOD: usize = 16;
 /// Repetitions of the cycle that must be seen.
 const MIN_REPETITIONS: usize = 3;
@@ -13,9 +13,9 @@ pub const TOLERANCE: f64 = 2e-3;
 /// The same under the true dither signal, whose ripple the maxima ride on.
 pub const RIPPLE_TOLERANCE: f64 = 1e-2;
 /// Height over its surroundings at which a maximum counts, as a share of the yaw rate's range.
-pub(crate) const PROMINENCE: f64 = 1e-2;
+pub const PROMINENCE: f64 = 1e-2;
 /// A yaw rate that varies by less than this is at rest, rad/s.
-pub(super) const AT_REST_RAD_PER_S: f64 = 1e-6;
+pub const AT_REST_RAD_PER_S: f64 = 1e-6;
 
 /// What a motion's maxima say.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -94,7 +94,7 @@ pub fn mean_cycle_s(trace: &Trace) -> Option<f64> {
 
 /// Indices of the maxima to which `values` rise by at least `prominence`, and from which they fall
 /// by as much.
-pub(crate) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
+pub fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
     let mut maxima = Vec::new();
     let mut rising = false;
     // The furthest point in the present direction.
@@ -120,7 +120,7 @@ pub(crate) fn prominent_maxima(values: &[f64], prominence: f64) -> Vec<usize> {
 
 /// Time (s) and height of the maxima among a quantity's turning points that stand out by a
 /// hundredth of its range.
-pub(crate) fn maxima_of_turns(turns: &[(f64, f64)], range: f64) -> Vec<(f64, f64)> {
+pub fn maxima_of_turns(turns: &[(f64, f64)], range: f64) -> Vec<(f64, f64)> {
     let heights: Vec<f64> = turns.iter().map(|&(_, height)| height).collect();
     let maxima = prominent_maxima(&heights, PROMINENCE * range);
     maxima.into_iter().map(|k| turns[k]).collect()

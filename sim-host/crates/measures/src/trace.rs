@@ -1,9 +1,10 @@
 //! A recorded motion: states at a fixed step, and the duty codes of the PWM.
 
-use engine::is_bounded;
+use crate::early_end::is_bounded;
 use nalgebra::Vector4;
+use shared_model::open_loop::OpenLoop;
 use shared_model::vehicle::State;
-use std::io::Write;
+use shared_model::{Real, Scenario};
 
 /// A motion sampled at every model step.
 #[derive(Debug, Clone)]
@@ -12,7 +13,7 @@ pub struct Trace {
     pub step_s: f64,
     /// State at time 0.
     pub initial: State<f64>,
-    /// State behind each step: that with index k is at time (k + 1) times the step.
+    /// State after each step: that with index k is at time (k + 1) times the step.
     pub states: Vec<State<f64>>,
     /// Duty code of each PWM period.
     pub duties: Vec<u16>,
@@ -23,6 +24,29 @@ pub struct Trace {
 }
 
 impl Trace {
+    /// Runs a scenario's program from its present state on, for the length of the scenario, and
+    /// records it.
+    pub fn record<T: Real>(ecu: &mut OpenLoop<T>, scenario: &Scenario<T>) -> Self {
+        let steps = scenario.steps() as usize;
+        let samples_per_step = scenario.samples_per_step() as usize;
+        let initial = ecu.control.state().map(Real::to_f64);
+        let mut states = Vec::with_capacity(steps);
+        let mut duties = Vec::with_capacity(steps * samples_per_step);
+        for _ in 0..steps {
+            interrupt::check();
+            let state = ecu.step(|duty| duties.push(duty.code()));
+            states.push(state.map(Real::to_f64));
+        }
+        Self {
+            step_s: 1.0 / scenario.model_rate_hz().to_f64(),
+            initial,
+            states,
+            duties,
+            samples_per_step,
+            pwm_period: ecu.pwm.neutral().period(),
+        }
+    }
+
     /// Time of the state with index `k`, s.
     pub fn time_s(&self, k: usize) -> f64 {
         (k + 1) as f64 * self.step_s
@@ -36,33 +60,6 @@ impl Trace {
     /// Time of PWM period `n`'s start, s.
     pub fn pwm_time_s(&self, n: usize) -> f64 {
         n as f64 * self.step_s / self.samples_per_step as f64
-    }
-
-    /// Writes the motion as CSV, one row per model step; the duty code is that of the step's last
-    /// PWM period.
-    ///
-    /// # Errors
-    /// If the writer fails.
-    pub fn write_csv(&self, to: &mut dyn Write) -> csv::Result<()> {
-        let mut csv = csv::Writer::from_writer(to);
-        csv.write_record([
-            "time_s",
-            "sideslip_rad",
-            "yaw_rate_rad_per_s",
-            "steering_angle_rad",
-            "steering_rate_rad_per_s",
-            "friction_mode",
-            "duty_code",
-        ])?;
-        let duties = self.duties.chunks(self.samples_per_step);
-        for (k, (state, duties)) in self.states.iter().zip(duties).enumerate() {
-            let mut row = vec![self.time_s(k).to_string()];
-            row.extend(state.x.iter().map(f64::to_string));
-            row.push(format!("{:?}", state.friction).to_lowercase());
-            row.push(duties.last().map_or(String::new(), u16::to_string));
-            csv.write_record(row)?;
-        }
-        Ok(csv.flush()?)
     }
 
     /// The state at the start of each step.
@@ -88,8 +85,8 @@ impl Trace {
     }
 
     /// Time at which the numerical solution leaves all physical bounds, if it does, s;
-    /// [`early_end`](crate::simulate::early_end) finds out why.
-    pub(crate) fn leaves_bounds_at_s(&self) -> Option<f64> {
+    /// the reference integrator of the host's programs finds out why.
+    pub fn leaves_bounds_at_s(&self) -> Option<f64> {
         let first = self.states.iter().position(|state| !is_bounded(&state.x))?;
         Some(self.time_s(first))
     }
