@@ -58,7 +58,9 @@ pub trait ParameterSet<T: Real>: Copy + 'static {
 
     /// Description of the parameter called `name`; `None` if the set has none of that name.
     fn description(name: &str) -> Option<&'static str> {
-        let (_, text) = Self::DESCRIPTIONS.iter().find(|(known, _)| *known == name)?;
+        let (_, text) = Self::DESCRIPTIONS
+            .iter()
+            .find(|(known, _)| *known == name)?;
         Some(text.trim_start())
     }
 

@@ -33,13 +33,13 @@ CO_SIMULATION = 1
 class Unit:
     """An instance of a unit, with its variables by name."""
 
-    def __init__(self, path, name="one", guid=None, **experiment):
+    def __init__(self, path, name="one", **experiment):
         self.messages = []
         self.description = read_model_description(path)
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
         self.outputs = [v for v in self.description.modelVariables if v.causality == "output"]
         self.fmu = FMU2Slave(
-            guid=guid or self.description.guid,
+            guid=self.description.guid,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
             unzipDirectory=extract(path),
             instanceName=name,
@@ -51,7 +51,10 @@ class Unit:
         self.callbacks.stepFinished = fmi2StepFinishedTYPE(0)
         self.experiment = experiment
         self.readers = self.grouped(self.outputs)
-        self.fmu.instantiate(callbacks=self.callbacks)
+        try:
+            self.fmu.instantiate(callbacks=self.callbacks)
+        except Exception as failure:
+            raise AssertionError(self.messages) from failure
         self.time = experiment.get("startTime", 0.0)
 
     def log(self, environment, name, status, category, message):

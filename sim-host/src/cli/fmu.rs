@@ -63,9 +63,15 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let scenario = arguments.config.load()?;
     validate(&scenario)?;
     arguments.unit.check(&scenario)?;
-    let content = fs::read(&library).with_context(|| format!("cannot read {}", library.display()))?;
+    let content =
+        fs::read(&library).with_context(|| format!("cannot read {}", library.display()))?;
     output::write(&arguments.out, arguments.force, |to| {
-        Ok(write(arguments.unit, &scenario, &content, to as &mut dyn Write)?)
+        Ok(write(
+            arguments.unit,
+            &scenario,
+            &content,
+            to as &mut dyn Write,
+        )?)
     })?;
     say!(
         "{}: FMI 2.0 for co-simulation, step size {} s, {} variables",

@@ -54,7 +54,9 @@ fn add(
 ) -> Result<(), rawzip::Error> {
     let file = archive.new_file(name).unix_permissions(permissions);
     let file = file.last_modified(UtcDateTime::from_unix(EARLIEST_S));
-    let (mut entry, config) = file.compression_method(CompressionMethod::DEFLATE).start()?;
+    let (mut entry, config) = file
+        .compression_method(CompressionMethod::DEFLATE)
+        .start()?;
     let mut data = config.wrap(DeflateEncoder::new(&mut entry, Compression::default()));
     data.write_all(content)?;
     let (encoder, descriptor) = data.finish()?;

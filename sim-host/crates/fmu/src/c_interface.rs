@@ -27,7 +27,8 @@ const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Component`.
 type Handle = *mut c_void;
 /// `fmi2CallbackLogger`.
-type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
+type Logger =
+    unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
 
 /// `fmi2CallbackFunctions`.
 #[repr(C)]
@@ -58,7 +59,15 @@ impl Log {
         let category = CString::new(LOG_CATEGORY).unwrap_or_default();
         let (name, environment) = (self.name.as_ptr(), self.environment);
         // SAFETY: the master's function, with a format that has no arguments; all texts live until it returns.
-        unsafe { logger(environment, name, ERROR, category.as_ptr(), message.as_ptr()) }
+        unsafe {
+            logger(
+                environment,
+                name,
+                ERROR,
+                category.as_ptr(),
+                message.as_ptr(),
+            )
+        }
     }
 }
 
@@ -171,7 +180,9 @@ fn set<T: Copy>(
 
 /// A function that this unit does not have, as its description says.
 fn missing(handle: Handle, function: &str) -> Status {
-    call(handle, function, |_| Err("not supported; see the model description".to_owned()))
+    call(handle, function, |_| {
+        Err("not supported; see the model description".to_owned())
+    })
 }
 
 /// A call without variables, which has nothing to do.

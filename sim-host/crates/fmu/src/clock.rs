@@ -33,7 +33,10 @@ impl Clock {
     /// At the start of an experiment, which may have an end.
     pub fn new(start_s: f64, stop_s: Option<f64>) -> Result<Self, String> {
         if !start_s.is_finite() {
-            return Err(format!("start time {} s: must be a finite number", Short(start_s)));
+            return Err(format!(
+                "start time {} s: must be a finite number",
+                Short(start_s)
+            ));
         }
         // Written so that NaN is refused.
         if let Some(stop_s) = stop_s.filter(|stop_s| !(*stop_s > start_s)) {
@@ -123,8 +126,14 @@ mod tests {
     fn periods_of_steps_of_all_sizes() {
         assert_eq!(run(1e-4, 3), [(1, true), (2, true), (3, true)]);
         assert_eq!(run(1e-3, 2), [(10, true), (20, true)]);
-        assert_eq!(run(0.5e-4, 4), [(1, false), (1, true), (2, false), (2, true)]);
-        assert_eq!(run(0.4e-4, 5), [(1, false), (1, false), (2, false), (2, false), (2, true)]);
+        assert_eq!(
+            run(0.5e-4, 4),
+            [(1, false), (1, true), (2, false), (2, true)]
+        );
+        assert_eq!(
+            run(0.4e-4, 5),
+            [(1, false), (1, false), (2, false), (2, false), (2, true)]
+        );
         assert_eq!(run(2.5e-4, 2), [(3, false), (5, true)]);
     }
 

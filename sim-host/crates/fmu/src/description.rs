@@ -33,12 +33,7 @@ pub fn guid(model: Model, scenario: &Scenario<f64>) -> String {
     format!("{{{}}}", groups.join("-"))
 }
 
-fn written(
-    model: Model,
-    scenario: &Scenario<f64>,
-    variables: &[Variable],
-    guid: &str,
-) -> String {
+fn written(model: Model, scenario: &Scenario<f64>, variables: &[Variable], guid: &str) -> String {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     let done = document(&mut xml, model, scenario, variables, guid);
     done.expect("memory takes every byte");
@@ -54,7 +49,9 @@ fn document(
     guid: &str,
 ) -> io::Result<()> {
     let about = match model {
-        Model::Ecu => "Steering ECU: control task with gate, and PWM task, in the arithmetic of the target",
+        Model::Ecu => {
+            "Steering ECU: control task with gate, and PWM task, in the arithmetic of the target"
+        }
         Model::Vehicle => "Vehicle on a low-friction road, with steering servo and sensors",
     };
     xml.create_element("fmiModelDescription")
@@ -256,14 +253,15 @@ fn structure(xml: &mut Xml, variables: &[Variable]) -> io::Result<()> {
                 }
                 Ok(())
             })?;
-            xml.create_element("InitialUnknowns").write_inner_content(|xml| {
-                for index in &outputs {
-                    xml.create_element("Unknown")
-                        .with_attribute(("index", index.as_str()))
-                        .write_empty()?;
-                }
-                Ok(())
-            })?;
+            xml.create_element("InitialUnknowns")
+                .write_inner_content(|xml| {
+                    for index in &outputs {
+                        xml.create_element("Unknown")
+                            .with_attribute(("index", index.as_str()))
+                            .write_empty()?;
+                    }
+                    Ok(())
+                })?;
             Ok(())
         })?;
     Ok(())

@@ -16,7 +16,10 @@ pub(crate) const SIGNALS: [(&str, &str); 5] = [
     ("yaw_rate_rad_per_s", "Yaw rate gamma"),
     ("steering_angle_rad", "Front steering angle delta_f"),
     ("steering_rate_rad_per_s", "Steering rate"),
-    ("current_request_a", "Motor current that the driver requests"),
+    (
+        "current_request_a",
+        "Motor current that the driver requests",
+    ),
 ];
 
 /// The signals of a measurement in that order.
@@ -57,18 +60,67 @@ pub(crate) fn outputs() -> Vec<Variable> {
     let faults = bits(Fault::ALL.map(|fault| fault.name().into()).to_vec());
     let warnings = bits(Warning::ALL.map(|warning| warning.name().into()).to_vec());
     vec![
-        new("duty_code", integer, "Duty of the PWM period that begins, counts of the PWM timer."),
-        new("duty", real, "The same as a share of the period; a half is neutral."),
-        new("bridge_on", Value::Boolean(false), "The servo's bridge is on."),
-        new("servo_v", real, "Mean voltage on the servo in that period; 0 while the bridge is off."),
-        new("mode", integer, "Operating mode, of the last actuator frame, as all below.")
-            .one_of(modes.to_vec()),
-        new("faults", integer, &format!("Faults that put the ECU into its safe state, {faults}.")),
-        new("motor_voltage_v", real, "Motor's share of the servo voltage."),
-        new("dither_amplitude_v", real, "Amplitude of the dither on the servo voltage."),
-        new("wheel_speed_limit_rpm", real, "Wheel speed that the vehicle must not exceed."),
-        new("warnings", integer, &format!("Events since the last frame that are tolerated, {warnings}.")),
-        new("sensor_counter", integer, "Counter of the last sensor frame that was used; 255 before the first."),
+        new(
+            "duty_code",
+            integer,
+            "Duty of the PWM period that begins, counts of the PWM timer.",
+        ),
+        new(
+            "duty",
+            real,
+            "The same as a share of the period; a half is neutral.",
+        ),
+        new(
+            "bridge_on",
+            Value::Boolean(false),
+            "The servo's bridge is on.",
+        ),
+        new(
+            "servo_v",
+            real,
+            "Mean voltage on the servo in that period; 0 while the bridge is off.",
+        ),
+        new(
+            "mode",
+            integer,
+            "Operating mode, of the last actuator frame, as all below.",
+        )
+        .one_of(modes.to_vec()),
+        new(
+            "faults",
+            integer,
+            &format!("Faults that put the ECU into its safe state, {faults}."),
+        ),
+        new(
+            "motor_voltage_v",
+            real,
+            "Motor's share of the servo voltage.",
+        ),
+        new(
+            "dither_amplitude_v",
+            real,
+            "Amplitude of the dither on the servo voltage.",
+        ),
+        new(
+            "wheel_speed_limit_rpm",
+            real,
+            "Wheel speed that the vehicle must not exceed.",
+        ),
+        new(
+            "warnings",
+            integer,
+            &format!("Events since the last frame that are tolerated, {warnings}."),
+        ),
+        new(
+            "sensor_counter",
+            integer,
+            "Counter of the last sensor frame that was used; 255 before the first.",
+        ),
+        new(
+            "challenge",
+            integer,
+            "Challenge; the unit answers it in its own sensor frames.",
+        ),
     ]
 }
 
@@ -76,7 +128,8 @@ pub(crate) fn outputs() -> Vec<Variable> {
 #[derive(Debug, Clone)]
 pub(crate) struct EcuProgram {
     node: EcuNode,
-    pwm: Pwm<f32>,
+    /// In the arithmetic of the vehicle.
+    pwm: Pwm<f64>,
     /// Reported before the first actuator frame.
     initial: Actuation<f32>,
     has_started: bool,
@@ -90,7 +143,7 @@ impl EcuProgram {
         let own = ecu_scenario(scenario, manoeuvre);
         Ok(Self {
             node: EcuNode::new(&own)?,
-            pwm: Pwm::new(&own.servo, own.run.pwm_rate_hz),
+            pwm: Pwm::new(&scenario.servo, scenario.run.pwm_rate_hz),
             initial: Actuation {
                 mode: Mode::Starting,
                 faults: 0,
@@ -142,7 +195,7 @@ impl EcuProgram {
             Value::Integer(duty_code.into()),
             Value::Real(f64::from(duty_code) / f64::from(period)),
             Value::Boolean(bridge_on),
-            real(servo_v),
+            Value::Real(servo_v),
             Value::Integer(now.mode as i32),
             Value::Integer(now.faults as i32),
             real(now.motor_voltage_v),
@@ -150,6 +203,7 @@ impl EcuProgram {
             real(now.wheel_speed_limit_rpm),
             Value::Integer(now.warnings.into()),
             Value::Integer(now.sensor_counter.into()),
+            Value::Integer(now.challenge.into()),
         ]
     }
 }

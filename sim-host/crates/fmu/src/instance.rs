@@ -75,8 +75,8 @@ impl Instance {
         let path = location::path(resources)?.join(CONFIGURATION);
         let text = input::read_text(&path, input::TEXT_BYTES)
             .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
-        let scenario = config::from_toml(&text)
-            .map_err(|error| format!("{}: {error}", path.display()))?;
+        let scenario =
+            config::from_toml(&text).map_err(|error| format!("{}: {error}", path.display()))?;
         let model = Model::ALL
             .into_iter()
             .find(|model| guid(*model, &scenario) == own_guid)
@@ -289,7 +289,9 @@ impl Instance {
     /// If there is none of that number.
     pub fn restore(&mut self, number: usize) -> Result<(), Refusal> {
         let stored = self.stored.get(&number);
-        self.now = stored.ok_or("no state of this instance, or one that was freed")?.clone();
+        self.now = stored
+            .ok_or("no state of this instance, or one that was freed")?
+            .clone();
         Ok(())
     }
 

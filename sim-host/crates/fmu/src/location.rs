@@ -7,7 +7,8 @@ use std::path::PathBuf;
 /// # Errors
 /// If it is no URI of a local file.
 pub(crate) fn path(uri: &str) -> Result<PathBuf, String> {
-    let refused = || format!("resource location {uri:?}: must be a URI like file:///folder/resources");
+    let refused =
+        || format!("resource location {uri:?}: must be a URI like file:///folder/resources");
     let rest = uri.strip_prefix("file:").ok_or_else(refused)?;
     let path = match rest.strip_prefix("//") {
         Some(with_host) => with_host.strip_prefix("localhost").unwrap_or(with_host),
@@ -16,7 +17,9 @@ pub(crate) fn path(uri: &str) -> Result<PathBuf, String> {
     if !path.starts_with('/') {
         return Err(refused());
     }
-    String::from_utf8(decoded(path)).map(PathBuf::from).map_err(|_| refused())
+    String::from_utf8(decoded(path))
+        .map(PathBuf::from)
+        .map_err(|_| refused())
 }
 
 /// With each `%` and two hexadecimal digits as the byte that they are.
@@ -53,7 +56,14 @@ mod tests {
         ] {
             assert_eq!(path(uri), Ok(PathBuf::from(expected)));
         }
-        for uri in ["", "/tmp/r", "https://host/r", "file://host", "file:r", "file:///%FF"] {
+        for uri in [
+            "",
+            "/tmp/r",
+            "https://host/r",
+            "file://host",
+            "file:r",
+            "file:///%FF",
+        ] {
             assert!(path(uri).unwrap_err().contains("file:///"), "{uri}");
         }
     }

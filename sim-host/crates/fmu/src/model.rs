@@ -88,14 +88,13 @@ impl Program {
         values: &[Value],
     ) -> Result<Self, InvalidModel> {
         let all = || variables.iter().zip(values.iter().copied());
-        let parameters = || all().filter(|(variable, _)| variable.causality == Causality::Parameter);
+        let parameters =
+            || all().filter(|(variable, _)| variable.causality == Causality::Parameter);
         let scenario = parameters::scenario(parameters());
         let manoeuvre = parameters::manoeuvre(&scenario, parameters());
         let part = match model {
             Model::Ecu => Part::Ecu(Box::new(EcuProgram::new(&scenario, &manoeuvre)?)),
-            Model::Vehicle => {
-                Part::Vehicle(Box::new(VehicleProgram::new(&scenario, &manoeuvre)?))
-            }
+            Model::Vehicle => Part::Vehicle(Box::new(VehicleProgram::new(&scenario, &manoeuvre)?)),
         };
         Ok(Self {
             pwm_rate_hz: scenario.run.pwm_rate_hz,

@@ -54,7 +54,11 @@ pub(crate) fn of_manoeuvre() -> Vec<Variable> {
         .within(SPEED_RATE_RANGE_RPM_PER_S),
     ];
     let sensors = &manoeuvre.sensors;
-    variables.extend(numbers(RESOLUTION, "Resolution; 0 is none. ", &sensors.resolution));
+    variables.extend(numbers(
+        RESOLUTION,
+        "Resolution; 0 is none. ",
+        &sensors.resolution,
+    ));
     let noise = "Standard deviation of the white Gaussian noise. ";
     variables.extend(numbers(NOISE, noise, &sensors.noise));
     variables.push(
@@ -66,8 +70,12 @@ pub(crate) fn of_manoeuvre() -> Vec<Variable> {
         .within((0.0, MAX_DELAY_TICKS as f64)),
     );
     variables.push(
-        new(SEED, Value::Integer(sensors.seed as i32), "Seed of the noise.")
-            .within((0.0, f64::from(i32::MAX))),
+        new(
+            SEED,
+            Value::Integer(sensors.seed as i32),
+            "Seed of the noise.",
+        )
+        .within((0.0, f64::from(i32::MAX))),
     );
     variables.extend(numbers(ServoFilter::SECTION, "", &manoeuvre.servo_filter));
     variables
@@ -80,8 +88,13 @@ fn numbers<P: ParameterSet<f64>>(section: &str, about: &str, set: &P) -> Vec<Var
         let name = format!("{section}.{}", field.name);
         let text = P::description(field.name).unwrap_or_default();
         let start = Value::Real(*(field.accessor)(&mut set));
-        Variable::new(Causality::Parameter, &name, start, &format!("{about}{text}"))
-            .within((field.min, field.max))
+        Variable::new(
+            Causality::Parameter,
+            &name,
+            start,
+            &format!("{about}{text}"),
+        )
+        .within((field.min, field.max))
     });
     variables.collect()
 }

@@ -134,7 +134,9 @@ impl Variable {
             return Ok(());
         }
         let names = self.alternatives.iter();
-        let names: Vec<String> = names.map(|(number, name)| format!("{number} ({name})")).collect();
+        let names: Vec<String> = names
+            .map(|(number, name)| format!("{number} ({name})"))
+            .collect();
         Err(format!(
             "{} = {value:?}: must be one of {}",
             self.name,

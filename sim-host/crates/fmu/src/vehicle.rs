@@ -17,9 +17,17 @@ pub(crate) fn inputs(scenario: &Scenario<f64>) -> Vec<Variable> {
     let pwm = Pwm::new(&scenario.servo, run.pwm_rate_hz);
     let duty = pwm.duty(scenario.motor_voltage_v());
     vec![
-        new("duty_code", Value::Integer(duty.code().into()), "Duty of the servo, counts of the PWM timer.")
-            .within((0.0, f64::from(duty.period()))),
-        new("bridge_on", Value::Boolean(true), "The servo's bridge is on."),
+        new(
+            "duty_code",
+            Value::Integer(duty.code().into()),
+            "Duty of the servo, counts of the PWM timer.",
+        )
+        .within((0.0, f64::from(duty.period()))),
+        new(
+            "bridge_on",
+            Value::Boolean(true),
+            "The servo's bridge is on.",
+        ),
         new(
             "wheel_speed_limit_rpm",
             Value::Real(SPEED_RANGE_RPM.1),
@@ -46,7 +54,11 @@ pub(crate) fn outputs() -> Vec<Variable> {
     let new = |name: &str, start, text: &str| Variable::new(Causality::Output, name, start, text);
     let real = Value::Real(0.0);
     let measured = SIGNALS.iter().map(|(name, text)| {
-        new(name, real, &format!("{text}, measured at the last control tick."))
+        new(
+            name,
+            real,
+            &format!("{text}, measured at the last control tick."),
+        )
     });
     let mut outputs: Vec<Variable> = measured.collect();
     let modes = FrictionMode::ALL.map(|mode| (mode as i32, format!("{mode:?}").to_lowercase()));
@@ -54,12 +66,33 @@ pub(crate) fn outputs() -> Vec<Variable> {
         new("state.wheel_speed_rpm", real, "True wheel speed N."),
         new("state.sideslip_rad", real, "True sideslip angle beta."),
         new("state.yaw_rate_rad_per_s", real, "True yaw rate gamma."),
-        new("state.steering_angle_rad", real, "True front steering angle delta_f."),
+        new(
+            "state.steering_angle_rad",
+            real,
+            "True front steering angle delta_f.",
+        ),
         new("state.steering_rate_rad_per_s", real, "True steering rate."),
-        new("state.friction_mode", Value::Integer(0), "Mode of the dry friction.").one_of(modes.to_vec()),
-        new("motor_current_a", real, "Motor current of the last PWM period."),
-        new("dither_rad", real, "Dither ahead of the nonlinearities in that period."),
-        new("has_begun", Value::Boolean(false), "The lead-in is over; the vehicle moves."),
+        new(
+            "state.friction_mode",
+            Value::Integer(0),
+            "Mode of the dry friction.",
+        )
+        .one_of(modes.to_vec()),
+        new(
+            "motor_current_a",
+            real,
+            "Motor current of the last PWM period.",
+        ),
+        new(
+            "dither_rad",
+            real,
+            "Dither ahead of the nonlinearities in that period.",
+        ),
+        new(
+            "has_begun",
+            Value::Boolean(false),
+            "The lead-in is over; the vehicle moves.",
+        ),
     ]);
     outputs
 }

@@ -57,8 +57,7 @@ impl SensedPlant {
             sensors: Sensors::new(&manoeuvre.sensors),
             periods_per_tick,
             periods: 0,
-            lead_in_periods: periods_per_tick
-                .saturating_mul(lead_in_ticks(scenario, manoeuvre)),
+            lead_in_periods: periods_per_tick.saturating_mul(lead_in_ticks(scenario, manoeuvre)),
         })
     }
 
