@@ -61,23 +61,26 @@ class Unit:
         self.messages.append((name.decode(), status, category.decode(), message.decode()))
 
     def grouped(self, variables):
-        """The variables of each type: places, value references, getter."""
+        """The variables of each type: places, value references, room for their values, getter."""
         groups = []
-        for kinds, getter in [
-            (("Real",), self.fmu.getReal),
-            (("Integer", "Enumeration"), self.fmu.getInteger),
-            (("Boolean",), self.fmu.getBoolean),
+        for kinds, c_type, getter in [
+            (("Real",), ctypes.c_double, self.fmu.fmi2GetReal),
+            (("Integer", "Enumeration"), ctypes.c_int, self.fmu.fmi2GetInteger),
+            (("Boolean",), ctypes.c_int, self.fmu.fmi2GetBoolean),
         ]:
             found = [(i, v.valueReference) for i, v in enumerate(variables) if v.type in kinds]
             if found:
-                groups.append(([i for i, _ in found], [r for _, r in found], getter))
+                places, references = zip(*found)
+                count = len(found)
+                groups.append((places, (ctypes.c_uint * count)(*references), (c_type * count)(), getter))
         return groups
 
     def read(self):
         """All outputs, as numbers, in their order."""
         values = [0.0] * len(self.outputs)
-        for places, references, getter in self.readers:
-            for place, value in zip(places, getter(references)):
+        for places, references, room, getter in self.readers:
+            getter(self.fmu.component, references, len(places), room)
+            for place, value in zip(places, room):
                 values[place] = float(value)
         return values
 
