@@ -11,6 +11,7 @@ import math
 import sys
 from array import array
 from ctypes import byref, c_void_p
+from functools import cache
 from itertools import chain
 
 from fmpy import extract, read_model_description, simulate_fmu
@@ -26,8 +27,15 @@ from fmpy.fmi2 import (
 from fmpy.validation import validate_fmu
 
 PERIOD_S = 1e-4
+PERIODS_PER_TICK = 10
 OK, DISCARD, ERROR = 0, 2, 3
 CO_SIMULATION = 1
+
+
+@cache
+def extracted(path):
+    """The folder of a unit. All its instances are in one library, which the process loads once."""
+    return extract(path)
 
 
 class Unit:
@@ -41,7 +49,7 @@ class Unit:
         self.fmu = FMU2Slave(
             guid=self.description.guid,
             modelIdentifier=self.description.coSimulation.modelIdentifier,
-            unzipDirectory=extract(path),
+            unzipDirectory=extracted(path),
             instanceName=name,
         )
         self.callbacks = fmi2CallbackFunctions()
@@ -168,6 +176,7 @@ def coupled(ecu, vehicle, job):
     driver = array("d")
     with open(job["driver"], "rb") as file:
         driver.frombytes(file.read())
+    replayed = Unit(ecu, name="replayed").begin()
     ecu, vehicle = Unit(ecu).begin(), Unit(vehicle).begin(job["parameters"])
     names = [output.name for output in ecu.outputs]
     duty, bridge, limit = (names.index(n) for n in ("duty_code", "bridge_on", "wheel_speed_limit_rpm"))
@@ -178,6 +187,8 @@ def coupled(ecu, vehicle, job):
     ]
     duty_in, bridge_in = (vehicle.variables[name].valueReference for name in ("duty_code", "bridge_on"))
     rows = array("d")
+    # The ECU's inputs and outputs at each control tick.
+    ticks = []
     measured = vehicle.read()[:5]
     for period in range(len(driver) // 2):
         out = ecu.read()
@@ -185,6 +196,8 @@ def coupled(ecu, vehicle, job):
         vehicle.fmu.setBoolean([bridge_in], [int(out[bridge])])
         vehicle.fmu.setReal(reals, [out[limit], *driver[2 * period : 2 * period + 2]])
         ecu.fmu.setReal(signals, measured)
+        if period % PERIODS_PER_TICK == 0:
+            ticks.append((measured, out))
         vehicle.step()
         ecu.step()
         seen = vehicle.read()
@@ -193,6 +206,11 @@ def coupled(ecu, vehicle, job):
         rows.extend(seen)
     with open(job["trace"], "wb") as file:
         rows.tofile(file)
+    # The ECU alone, a step for each tick.
+    for inputs, outputs in ticks:
+        assert same([replayed.read()], [outputs]), f"at {replayed.time} s"
+        replayed.fmu.setReal(signals, inputs)
+        replayed.step(PERIODS_PER_TICK * PERIOD_S)
 
 
 QUICK = {"dither.waveform": 2, "dither.start_time_s": 0.0, "controller.dither_ramp_s": 0.05}

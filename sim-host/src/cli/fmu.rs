@@ -3,12 +3,12 @@
 use super::options::ConfigOptions;
 use super::outcome::Outcome;
 use super::output::check;
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::builder::PossibleValuesParser;
 use clap::builder::TypedValueParser;
 use dynamics::config::validate;
 use files::output;
-use fmu::archive::{LIBRARY, write};
+use fmu::archive::{LIBRARY, is_library, write};
 use fmu::model::Model;
 use std::env;
 use std::fs;
@@ -37,8 +37,8 @@ pub struct Arguments {
     /// File to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Shared library of the units [default: libdithersteer_fmu.so beside this program, or in `deps`
-    /// beside it]
+    /// Shared library of the units [default: libdithersteer_fmu.so in `deps` beside this program, as
+    /// built, or beside it, as installed]
     #[arg(long, value_name = "FILE")]
     library: Option<PathBuf>,
     /// Overwrite an existing file
@@ -65,6 +65,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     arguments.unit.check(&scenario)?;
     let content =
         fs::read(&library).with_context(|| format!("cannot read {}", library.display()))?;
+    ensure!(
+        is_library(&content),
+        "{} is not {LIBRARY} of this version",
+        library.display()
+    );
     output::write(&arguments.out, arguments.force, |to| {
         Ok(write(
             arguments.unit,
@@ -82,15 +87,17 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     Ok(Outcome::Success)
 }
 
-/// The shared library: beside the installed program, or where a build leaves it.
+/// The shared library: where a build leaves it, or beside the installed program.
 fn library() -> anyhow::Result<PathBuf> {
     let program = env::current_exe().unwrap_or_default();
     let folder = program.parent().unwrap_or(Path::new(""));
-    let places = [folder.join(LIBRARY), folder.join("deps").join(LIBRARY)];
+    // First where every build leaves it: a build of the whole workspace also leaves a copy beside the program, which later
+    // builds of the program do not renew.
+    let places = [folder.join("deps").join(LIBRARY), folder.join(LIBRARY)];
     if let Some(found) = places.iter().find(|place| place.is_file()) {
         return Ok(found.clone());
     }
-    let [installed, built] = &places;
+    let [built, installed] = &places;
     bail!(
         "no shared library of the units: there is no {}, no {}; copy it there from the release, build it with \
          `cargo build --release -p sim-host`, or give its path by --library",

@@ -21,6 +21,12 @@ const EARLIEST_S: i64 = 315_532_800;
 /// File name of the shared library that is the binary of both units.
 pub const LIBRARY: &str = "libdithersteer_fmu.so";
 
+/// Whether this is the content of the file [`LIBRARY`] of this version.
+pub fn is_library(content: &[u8]) -> bool {
+    let has = |text: &[u8]| content.windows(text.len()).any(|window| window == text);
+    has(b"fmi2DoStep") && has(description::TOOL.as_bytes())
+}
+
 /// Writes the archive of a unit. `library` is the content of the file [`LIBRARY`] of this version.
 ///
 /// # Errors

@@ -9,7 +9,7 @@ use shared_model::Scenario;
 use std::io;
 
 /// The generator, and the tool that a master names.
-const TOOL: &str = concat!("Dithersteer ", env!("CARGO_PKG_VERSION"));
+pub(crate) const TOOL: &str = concat!("Dithersteer ", env!("CARGO_PKG_VERSION"));
 const FINGERPRINTS: [crc::Crc<u64>; 2] = [
     crc::Crc::<u64>::new(&crc::CRC_64_XZ),
     crc::Crc::<u64>::new(&crc::CRC_64_ECMA_182),
