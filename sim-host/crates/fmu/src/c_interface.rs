@@ -27,6 +27,7 @@ const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Component`.
 type Handle = *mut c_void;
 /// `fmi2CallbackLogger`.
+// SAFETY: a type; its call has a reason.
 type Logger =
     unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
 

@@ -38,8 +38,9 @@ impl Clock {
                 Short(start_s)
             ));
         }
-        // Written so that NaN is refused.
-        if let Some(stop_s) = stop_s.filter(|stop_s| !(*stop_s > start_s)) {
+        // NaN is not after it.
+        let is_after = |stop_s: &f64| *stop_s > start_s;
+        if let Some(stop_s) = stop_s.filter(|stop_s| !is_after(stop_s)) {
             return Err(format!(
                 "stop time {} s: must be after the start time, {} s",
                 Short(stop_s),
