@@ -83,7 +83,7 @@ impl Instance {
             .ok_or_else(|| {
                 let known = Model::ALL.map(|model| guid(model, &scenario));
                 format!(
-                    "GUID {own_guid:?}: must be that of this version and configuration, {} or {}; write the FMU anew by \
+                    "GUID {own_guid:?}: must be that of this version and configuration, {} or {}; write the FMU again by \
                      `sim-host fmu`",
                     known[0], known[1]
                 )

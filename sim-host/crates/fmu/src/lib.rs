@@ -6,7 +6,7 @@ mod c_interface;
 mod clock;
 pub mod description;
 mod ecu;
-pub mod instance;
+mod instance;
 mod location;
 pub mod model;
 mod parameters;
