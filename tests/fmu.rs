@@ -12,6 +12,7 @@ use pil::recording::Recording;
 use pil::vehicle_node::{VehicleNode, ecu_scenario};
 use qemu::Machine;
 use qemu::session::LinkKind;
+use rayon::prelude::*;
 use shared_model::Scenario;
 use shared_model::e2e::Sender;
 use shared_model::exchange::Packet;
@@ -414,19 +415,20 @@ fn assert_same(file: &str, rows: &[Row], expected: &Run) {
 #[test]
 fn the_loop_has_the_bits_of_pil() {
     let files = fs::read_dir(root().join("examples/manoeuvres")).expect("the examples are there");
-    let mut count = 0;
-    for file in files.flatten() {
-        let file = file.file_name().to_string_lossy().into_owned();
+    let files: Vec<String> = files
+        .flatten()
+        .map(|file| file.file_name().to_string_lossy().into_owned())
+        .collect();
+    assert_eq!(files.len(), 10);
+    files.par_iter().for_each(|file| {
         let duration_s = if file == "speed-ramp.toml" { 12.0 } else { 5.0 };
-        let (scenario, manoeuvre) = manoeuvre(&file, duration_s);
+        let (scenario, manoeuvre) = manoeuvre(file, duration_s);
         let mut ecu = Software::new(&ecu_scenario(&scenario, &manoeuvre)).expect("it is valid");
         let expected = run(&mut ecu, vehicle(&scenario, &manoeuvre), &mut || {});
         let expected = expected.expect("a program on the host is always reached");
         let rows = coupled(&manoeuvre.begin(&scenario), &manoeuvre);
-        assert_same(&file, &rows, &expected);
-        count += 1;
-    }
-    assert_eq!(count, 10);
+        assert_same(file, &rows, &expected);
+    });
 }
 
 /// The recording of the firmware in QEMU, as `sim-host pil --record` writes it, byte for byte.

@@ -102,12 +102,10 @@ impl<T: Real> Ecu<T> {
     }
 
     /// The output at the start of the next period, before the begun one ends. The input at that end
-    /// has no effect on it, except for the captured duty, which is taken to be the ECU's own. (With
-    /// a control tick in every period, the actuator frame does depend on it, and is missing here.)
-    pub fn ahead(&self, begun: &Begun) -> Begun {
-        let mut pwm = self.pwm.clone();
-        pwm.end(begun.packet.duty_code);
-        let period = pwm.begin();
+    /// does not change it. (A wrong duty on the pin does: it switches the bridge off. And with a
+    /// control tick in every period, the actuator frame depends on it, and is missing here.)
+    pub fn ahead(&self) -> Begun {
+        let period = self.pwm.clone().begin();
         let output = self.output.as_ref().filter(|_| period.control_due);
         Begun::of(&period, output)
     }

@@ -149,7 +149,7 @@ impl EcuProgram {
                 faults: 0,
                 motor_voltage_v: 0.0,
                 dither_amplitude_v: 0.0,
-                wheel_speed_limit_rpm: own.gate.wheel_speed_rpm,
+                wheel_speed_limit_rpm: own.gate.safe_wheel_speed_rpm,
                 warnings: 0,
                 sensor_counter: u8::MAX,
                 bridge_on: true,

@@ -73,7 +73,7 @@ impl EcuNode {
     /// The output in the next period, which the measurement at its start does not change. (With a
     /// control tick in every period, the actuation is that of the period before.)
     pub fn next_output(&self) -> EcuOutput {
-        self.output_of(&self.ecu.ahead(&self.begun))
+        self.output_of(&self.ecu.ahead())
     }
 
     fn output_of(&self, begun: &Begun) -> EcuOutput {
