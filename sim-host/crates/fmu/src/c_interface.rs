@@ -456,3 +456,38 @@ exports! {
         DISCARD
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::archive::CONFIGURATION;
+    use crate::description::guid;
+    use crate::model::Model;
+    use shared_model::Scenario;
+
+    /// A panic is an error of the instance, which can be reset.
+    #[test]
+    fn no_panic_leaves_the_library() {
+        let scenario = Scenario::reconstruction();
+        let folder = tempfile::tempdir().unwrap();
+        let text = dynamics::config::to_toml(&scenario);
+        std::fs::write(folder.path().join(CONFIGURATION), text).unwrap();
+        let own_guid = CString::new(guid(Model::Ecu, &scenario)).unwrap();
+        let uri = CString::new(format!("file://{}", folder.path().display())).unwrap();
+        let handle = fmi2Instantiate(
+            c"one".as_ptr(),
+            CO_SIMULATION,
+            own_guid.as_ptr(),
+            uri.as_ptr(),
+            ptr::null(),
+            0,
+            0,
+        );
+        assert!(!handle.is_null());
+        assert_eq!(call(handle, "a panic", |_| panic!("of the test")), ERROR);
+        assert_eq!(fmi2EnterInitializationMode(handle), ERROR);
+        assert_eq!(fmi2Reset(handle), OK);
+        assert_eq!(fmi2EnterInitializationMode(handle), OK);
+        fmi2FreeInstance(handle);
+    }
+}
