@@ -27,8 +27,9 @@ use shared_model::segments::first_identifier;
 use shared_model::signal::{Actuation, Measurement, Mode};
 use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::path::Path;
+use std::process::Stdio;
+use tests::python;
 
 /// Frames of each kind: the counter wraps around.
 const FRAMES: usize = 400;
@@ -39,32 +40,10 @@ const SENSOR: Kind = ("SensorFrame", SENSOR_DATA_ID);
 const ACTUATOR: Kind = ("ActuatorFrame", ACTUATOR_DATA_ID);
 const DIAGNOSTIC: Kind = ("DiagnosticFrame", DIAGNOSTIC_DATA_ID);
 
-/// The Python of `cargo xtask setup`.
-///
-/// # Panics
-/// If it is not there with the packages as pinned: a comparison that cannot be made has not passed.
-fn python() -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("python");
-    // Set-up leaves this copy when everything is installed.
-    let installed = fs::read_to_string(folder.join("requirements.txt")).unwrap_or_default();
-    assert!(
-        installed == include_str!("python/requirements.txt"),
-        "untested: {} does not have the packages of tests/python/requirements.txt: run `cargo xtask setup`",
-        folder.display()
-    );
-    folder.join(match cfg!(windows) {
-        true => "Scripts/python.exe",
-        false => "bin/python",
-    })
-}
-
 /// Queries tests/python/check_frames.py; an answer, as its words, for every question.
 fn query(questions: &[String]) -> Vec<Vec<String>> {
     let tests = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let mut child = Command::new(python())
-        // Isolated: no other packages by way of the environment.
-        .arg("-I")
-        .arg(tests.join("python/check_frames.py"))
+    let mut child = python::script("check_frames.py")
         .arg(tests.with_file_name("docs").join("dithersteer.dbc"))
         .arg(tests.with_file_name("docs").join("dithersteer-classic.dbc"))
         .stdin(Stdio::piped())
@@ -552,9 +531,7 @@ fn logs_are_read_by_python_can() {
         let mut file = fs::File::create(&path).expect("a file can be made");
         let format = Format::of(&path);
         write(&run.exchanges, scenario.run.pwm_rate_hz, format, &mut file).expect("it is written");
-        let output = Command::new(python())
-            .arg("-I")
-            .arg(tests.join("python/check_log.py"))
+        let output = python::script("check_log.py")
             .arg(tests.with_file_name("docs").join("dithersteer.dbc"))
             .arg(&path)
             .output()

@@ -63,20 +63,31 @@ impl<T: Real> Ecu<T> {
         exchange: impl FnOnce(&Packet) -> Packet,
         elapsed_counts: impl FnOnce() -> u32,
     ) -> Option<ControlOutput<T>> {
+        let begun = self.begin();
+        let reply = exchange(&begun.packet);
+        self.end(&begun, &reply, elapsed_counts)
+    }
+
+    /// The first half of a [`period`](Self::period): its begin.
+    pub fn begin(&mut self) -> Begun {
         let period = self.pwm.begin();
         let output = self.output.take_if(|_| period.control_due);
-        let frame = output.as_ref().map(|output| output.frame);
-        if let Some(output) = output {
-            self.pwm.accept(&output);
+        if let Some(output) = &output {
+            self.pwm.accept(output);
         }
-        let reply = exchange(&Packet {
-            duty_code: period.duty.code(),
-            bridge_on: period.bridge_on,
-            frame,
-        });
+        Begun::of(&period, output.as_ref())
+    }
+
+    /// The second half: its end, with the input there.
+    pub fn end(
+        &mut self,
+        begun: &Begun,
+        reply: &Packet,
+        elapsed_counts: impl FnOnce() -> u32,
+    ) -> Option<ControlOutput<T>> {
         self.pwm.end(reply.duty_code);
         self.frame = reply.frame.or(self.frame);
-        if !period.control_due {
+        if !begun.control_due {
             return None;
         }
         let input = ControlInput {
@@ -88,5 +99,36 @@ impl<T: Real> Ecu<T> {
         let output = self.control.run(&input);
         self.output = Some(output);
         Some(output)
+    }
+
+    /// The output at the start of the next period, before the begun one ends. The input at that end
+    /// does not change it. (A wrong duty on the pin does: it switches the bridge off. And with a
+    /// control tick in every period, the actuator frame depends on it, and is missing here.)
+    pub fn ahead(&self) -> Begun {
+        let period = self.pwm.clone().begin();
+        let output = self.output.as_ref().filter(|_| period.control_due);
+        Begun::of(&period, output)
+    }
+}
+
+/// A PWM period that has begun.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Begun {
+    /// The ECU's output at its start.
+    pub packet: Packet,
+    /// A control tick is due at its end.
+    pub control_due: bool,
+}
+
+impl Begun {
+    fn of<T>(period: &PwmPeriod, output: Option<&ControlOutput<T>>) -> Self {
+        Self {
+            packet: Packet {
+                duty_code: period.duty.code(),
+                bridge_on: period.bridge_on,
+                frame: output.map(|output| output.frame),
+            },
+            control_due: period.control_due,
+        }
     }
 }

@@ -25,6 +25,9 @@ pub trait ParameterSet<T: Real>: Copy + 'static {
     const SECTION: &'static str;
     /// All numbers of the set.
     const FIELDS: &'static [Field<Self, T>];
+    /// Name and description of every parameter, numbers and others, for people. Apart from
+    /// [`FIELDS`](Self::FIELDS), so that the texts are not in the firmware.
+    const DESCRIPTIONS: &'static [(&'static str, &'static str)];
 
     /// Checks that every number is finite and in its range.
     ///
@@ -51,6 +54,14 @@ pub trait ParameterSet<T: Real>: Copy + 'static {
     fn range(name: &str) -> Option<(f64, f64)> {
         let field = Self::FIELDS.iter().find(|field| field.name == name)?;
         Some((field.min, field.max))
+    }
+
+    /// Description of the parameter called `name`; `None` if the set has none of that name.
+    fn description(name: &str) -> Option<&'static str> {
+        let (_, text) = Self::DESCRIPTIONS
+            .iter()
+            .find(|(known, _)| *known == name)?;
+        Some(text.trim_start())
     }
 
     /// The number called `name`; `None` if the set has none of that name.
@@ -119,9 +130,9 @@ macro_rules! parameters {
         $(#[$about:meta])*
         pub struct $Set:ident {
             $(choices {
-                $($(#[$about_choice:meta])+ $choice:ident: $Kind:ty,)+
+                $($(#[doc = $about_choice:literal])+ $choice:ident: $Kind:ty,)+
             })?
-            $($(#[$about_number:meta])+ $number:ident: $min:literal..=$max:literal,)+
+            $($(#[doc = $about_number:literal])+ $number:ident: $min:literal..=$max:literal,)+
         }
     ) => {
         $(#[$about])*
@@ -129,9 +140,9 @@ macro_rules! parameters {
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
         pub struct $Set<T> {
-            $($($(#[$about_choice])+ pub $choice: $Kind,)+)?
+            $($($(#[doc = $about_choice])+ pub $choice: $Kind,)+)?
             $(
-                $(#[$about_number])+
+                $(#[doc = $about_number])+
                 #[doc = ""]
                 #[doc = concat!("Range: ", stringify!($min), " to ", stringify!($max), ".")]
                 pub $number: T,
@@ -157,6 +168,10 @@ macro_rules! parameters {
                     max: $max,
                     accessor: |set| &mut set.$number,
                 },)+
+            ];
+            const DESCRIPTIONS: &'static [(&'static str, &'static str)] = &[
+                $($((stringify!($choice), concat!($($about_choice),+)),)+)?
+                $((stringify!($number), concat!($($about_number),+)),)+
             ];
         }
     };

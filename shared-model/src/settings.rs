@@ -119,6 +119,33 @@ impl<T: Real> Scenario<T> {
 }
 
 impl<T: Real> Scenario<T> {
+    /// Description of the parameter `section.name`, with its unit; `None` if there is none of that
+    /// name.
+    ///
+    /// ```
+    /// use shared_model::Scenario;
+    /// let text = Scenario::<f64>::description("run.wheel_speed_rpm");
+    /// assert_eq!(text, Some("Wheel speed N, rpm."));
+    /// ```
+    pub fn description(key: &str) -> Option<&'static str> {
+        let (section, name) = key.rsplit_once('.')?;
+        match section {
+            "vehicle" => Vehicle::<T>::description(name),
+            "tires" => (name == "model").then_some("Which tyre the model uses."),
+            "tires.front" | "tires.rear" => MagicFormula::<T>::description(name),
+            "steering" => Steering::<T>::description(name),
+            "friction" => Friction::<T>::description(name),
+            "dither" => Dither::<T>::description(name),
+            "servo" => Servo::<T>::description(name),
+            "controller" => Policy::<T>::description(name),
+            "gate" => Limits::<T>::description(name),
+            "run" => Run::<T>::description(name),
+            _ => None,
+        }
+    }
+}
+
+impl<T: Real> Scenario<T> {
     /// The number `section.name`; `None` if there is none of that name.
     ///
     /// ```

@@ -210,6 +210,47 @@ fn a_command_acts_one_tick_later() {
     assert!(commands.last().unwrap() > &0.5);
 }
 
+/// The output of a period is known before it begins: no measurement at its start changes it.
+#[test]
+fn the_next_output_is_known_ahead() {
+    let mut every_period = scenario();
+    every_period.run.control_rate_hz = every_period.run.pwm_rate_hz;
+    for (scenario, periods_a_tick) in [(scenario(), PERIODS_A_TICK), (every_period, 1)] {
+        let mut ecu = Ecu::new(&scenario, CLOCK_HZ).unwrap();
+        let mut sender = Sender::new(SENSOR_DATA_ID);
+        let (mut challenge, mut codes) = (0, Vec::new());
+        let mut begun = ecu.begin();
+        for period in 1..=20_000_u32 {
+            let ahead = ecu.ahead();
+            if let Some(frame) = &begun.packet.frame {
+                challenge = decode_actuation(frame).unwrap().challenge;
+            }
+            // A request that changes all the time.
+            let measurement = measurement((period % 700) as f32 / 100.0);
+            let frame = begun
+                .control_due
+                .then(|| encode_measurement(&measurement, challenge, &mut sender));
+            let reply = Packet {
+                frame,
+                ..begun.packet
+            };
+            let counts = TICK_COUNTS * periods_a_tick / PERIODS_A_TICK;
+            let output = ecu.end(&begun, &reply, || counts);
+            assert_eq!(output.is_some(), period % periods_a_tick == 0);
+            begun = ecu.begin();
+            let mut expected = begun;
+            if periods_a_tick == 1 {
+                expected.packet.frame = None;
+            }
+            assert_eq!(ahead, expected, "period {period}");
+            codes.push(begun.packet.duty_code);
+        }
+        codes.sort_unstable();
+        codes.dedup();
+        assert!(codes.len() > 50, "the servo does not move");
+    }
+}
+
 #[test]
 fn an_actuator_frame_goes_out_once_a_tick() {
     let mut rig = Rig::new(&scenario());

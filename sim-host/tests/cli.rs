@@ -247,7 +247,7 @@ fn configurations_are_complete_and_read_back() {
     }
 }
 
-const COMMANDS: [&str; 26] = [
+const COMMANDS: [&str; 27] = [
     "verify",
     "pil",
     "simulate",
@@ -271,6 +271,7 @@ const COMMANDS: [&str; 26] = [
     "realisability",
     "faults",
     "config",
+    "fmu",
     "firmware image",
     "firmware run",
     "firmware decode",

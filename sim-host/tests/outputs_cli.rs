@@ -10,7 +10,7 @@ use std::process::Stdio;
 
 /// Each subcommand that writes files, with the options that name them. What they read need not be
 /// there: outputs come first.
-const WRITERS: [(&str, &[&str]); 23] = [
+const WRITERS: [(&str, &[&str]); 24] = [
     ("simulate", &["--out"]),
     ("lyapunov", &["--out", "--json", "--figure"]),
     (
@@ -40,6 +40,7 @@ const WRITERS: [(&str, &[&str]); 23] = [
     ("faults", &["--out", "--json", "--figure"]),
     ("decode run.bin", &["--out"]),
     ("pil", &["--record", "--out", "--json", "--figure"]),
+    ("fmu ecu", &["--out"]),
 ];
 
 fn words(line: &str) -> impl Iterator<Item = &str> {

@@ -1,6 +1,7 @@
 //! Runs of the firmware's images in QEMU, for the tests.
 
 pub mod golden;
+pub mod python;
 
 use image::Image;
 use qemu::log::LogDecoder;

@@ -97,6 +97,10 @@ const GROUPS: [Group; 4] = [
                 "complete configuration as TOML, with units and ranges",
             ),
             (
+                "fmu",
+                "ECU or vehicle as a unit for co-simulation by FMI 2.0",
+            ),
+            (
                 "convergence",
                 "error of the fixed step relative to the reference",
             ),

@@ -15,6 +15,7 @@ mod faults;
 mod feedback;
 mod feedback_table;
 mod firmware;
+mod fmu;
 mod grid;
 mod groups;
 mod lyapunov;
@@ -84,6 +85,7 @@ enum Command {
     Schedule(schedule::Arguments),
     Realisability(realisability::Arguments),
     Faults(faults::Arguments),
+    Fmu(fmu::Arguments),
     Config(config::Arguments),
     #[command(subcommand)]
     Firmware(firmware::Command),
@@ -152,6 +154,7 @@ fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Schedule(arguments) => schedule::run(&arguments),
         Command::Realisability(arguments) => realisability::run(&arguments),
         Command::Faults(arguments) => faults::run(&arguments),
+        Command::Fmu(arguments) => fmu::run(&arguments),
         Command::Config(arguments) => config::run(&arguments),
         Command::Firmware(command) => firmware::run(&command),
         Command::Decode(arguments) => firmware::decode::run(&arguments),

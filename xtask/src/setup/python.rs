@@ -1,4 +1,4 @@
-//! Python packages that the frames are checked against, in a virtual environment of their own:
+//! Python packages that frames and units are checked against, in a virtual environment of their own:
 //! nothing is installed into the machine's Python.
 
 use std::fs;
@@ -11,9 +11,10 @@ use crate::host::{Apt, Manager};
 use crate::{process, workspace};
 
 /// Purpose of the packages.
-const PURPOSE: &str = "the comparison of the frames with autosar-e2e and cantools";
+const PURPOSE: &str = "the comparison of frames and units with autosar-e2e, cantools and fmpy";
 /// Prints the version if the packages can be imported.
-const PROBE: &str = "import platform, cantools, e2e; print('Python', platform.python_version())";
+const PROBE: &str =
+    "import platform, cantools, e2e, fmpy.fmi2; print('Python', platform.python_version())";
 /// Where Debian splits Python, the package that brings `python3 -m venv`.
 const DEBIAN_PACKAGE: &str = "python3-venv";
 
@@ -84,7 +85,8 @@ fn make(folder: &Path) -> Result<()> {
     )?;
     let mut pip = Command::new(program(folder));
     pip.args(["-m", "pip", "install", "--quiet", "--no-input"])
-        .args(["--disable-pip-version-check", "--requirement"])
+        // Every package is listed, and nothing else is needed.
+        .args(["--disable-pip-version-check", "--no-deps", "--requirement"])
         .arg(requirements());
     process::run(&mut pip).context(
         "pip could not install them: Python 3.10 or later and a package index that pip reaches are needed \
@@ -97,7 +99,7 @@ fn requirements() -> PathBuf {
     workspace::root().join("tests/python/requirements.txt")
 }
 
-/// The folder of the virtual environment, which `tests/frames.rs` uses.
+/// The folder of the virtual environment, which the tests use.
 fn folder() -> Result<PathBuf> {
     Ok(workspace::target_dir()?.join("python"))
 }

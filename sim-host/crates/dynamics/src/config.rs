@@ -174,6 +174,86 @@ pub fn to_commented_toml(scenario: &Scenario<f64>) -> String {
     text
 }
 
+/// A parameter of a scenario.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Key, as in a file.
+    pub key: String,
+    /// Description, with the unit.
+    pub description: &'static str,
+    /// Value, with those that are allowed.
+    pub allowed: Allowed,
+}
+
+/// The value of a parameter, with those that are allowed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Allowed {
+    /// A number.
+    Range {
+        /// The number.
+        value: f64,
+        /// Least allowed number.
+        min: f64,
+        /// Greatest allowed number.
+        max: f64,
+    },
+    /// One of a few names.
+    Names {
+        /// The name.
+        value: String,
+        /// All names.
+        names: Vec<&'static str>,
+    },
+    /// True or false.
+    Flag {
+        /// Which.
+        value: bool,
+    },
+}
+
+/// All parameters of a scenario, in the order of its file.
+///
+/// ```
+/// use dynamics::config::{Allowed, parameters};
+/// use shared_model::Scenario;
+/// let all = parameters(&Scenario::reconstruction());
+/// let mass = all.iter().find(|one| one.key == "vehicle.mass_kg").unwrap();
+/// assert_eq!(mass.description, "Mass m, kg.");
+/// assert_eq!(mass.allowed, Allowed::Range { value: 1500.0, min: 1.0, max: 1e5 });
+/// ```
+pub fn parameters(scenario: &Scenario<f64>) -> Vec<Parameter> {
+    let mut parameters = Vec::new();
+    list("", table_of(scenario), &mut parameters);
+    parameters
+}
+
+fn list(prefix: &str, table: Table, parameters: &mut Vec<Parameter>) {
+    for (name, value) in table {
+        let key = format!("{prefix}{name}");
+        let allowed = match value {
+            Value::Table(table) => {
+                list(&format!("{key}."), table, parameters);
+                continue;
+            }
+            Value::Boolean(value) => Allowed::Flag { value },
+            Value::Float(value) => {
+                let (min, max) = Scenario::<f64>::range(&key).expect("every number has a range");
+                Allowed::Range { value, min, max }
+            }
+            other => Allowed::Names {
+                value: other.as_str().unwrap_or_default().to_owned(),
+                names: choices(&key).expect("all others have names"),
+            },
+        };
+        let description = Scenario::<f64>::description(&key).expect("every parameter has one");
+        parameters.push(Parameter {
+            key,
+            description,
+            allowed,
+        });
+    }
+}
+
 /// The allowed values of the parameter of that key, where its value does not show them.
 fn allowed(key: &str) -> Option<String> {
     match Scenario::<f64>::range(key) {

@@ -22,7 +22,7 @@ use shared_model::{InvalidScenario, Real, Scenario, ecu};
 use std::collections::VecDeque;
 
 /// Rate of an ideal clock, Hz.
-const CLOCK_HZ: u32 = 25_000_000;
+pub(crate) const CLOCK_HZ: u32 = 25_000_000;
 
 /// An ECU in the loop.
 pub trait Ecu {
@@ -34,7 +34,7 @@ pub trait Ecu {
     fn period(&mut self, answer: &mut dyn FnMut(&Packet) -> Packet) -> Result<(), RunError>;
 }
 
-fn counts_per_tick<T: Real>(scenario: &Scenario<T>) -> u32 {
+pub(crate) fn counts_per_tick<T: Real>(scenario: &Scenario<T>) -> u32 {
     (f64::from(CLOCK_HZ) / scenario.run.control_rate_hz.to_f64()) as u32
 }
 

@@ -21,8 +21,11 @@ const TABLE: &str = "manoeuvre";
 const OWN: [(&str, &str); 2] = [("run", "wheel_speed_rpm"), ("steering", "motor_current_a")];
 /// Ranges of the wheel speed (rpm) and the current request (A), equal to those of the scenario's
 /// parameters.
-pub(super) const SPEED_RANGE_RPM: (f64, f64) = (1.0, 1e5);
-const CURRENT_RANGE_A: (f64, f64) = (-1000.0, 1000.0);
+pub const SPEED_RANGE_RPM: (f64, f64) = (1.0, 1e5);
+/// See [`SPEED_RANGE_RPM`].
+pub const CURRENT_RANGE_A: (f64, f64) = (-1000.0, 1000.0);
+/// Range of the greatest rate of change of the wheel speed, rpm/s.
+pub const SPEED_RATE_RANGE_RPM_PER_S: (f64, f64) = (0.0, 1e6);
 
 /// A sine of the driver's current request.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -69,6 +72,11 @@ impl ParameterSet<f64> for RequestSine {
             max: 1e5,
             accessor: |p| &mut p.start_time_s,
         },
+    ];
+    const DESCRIPTIONS: &'static [(&'static str, &'static str)] = &[
+        ("amplitude_a", "Amplitude, A."),
+        ("frequency_hz", "Frequency, Hz."),
+        ("start_time_s", "Start time, at phase zero, s."),
     ];
 }
 
@@ -150,7 +158,7 @@ impl Manoeuvre {
 }
 
 fn validate_rate(rpm_per_s: f64) -> Result<(), OutOfRange> {
-    let (min, max) = (0.0, 1e6);
+    let (min, max) = SPEED_RATE_RANGE_RPM_PER_S;
     if (min..=max).contains(&rpm_per_s) {
         return Ok(());
     }

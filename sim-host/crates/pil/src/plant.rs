@@ -119,6 +119,14 @@ impl Plant {
             .set_wheel_speed_rpm(vehicle, self.wheel_speed_rpm);
     }
 
+    /// Replaces the manoeuvre's driver: from the next period on the wheel speed (rpm) and the current
+    /// request (A) are these, at the end of each period.
+    pub fn set_driver(&mut self, wheel_speed_rpm: f64, current_request_a: f64) {
+        self.manoeuvre.wheel_speed_rpm.hold(wheel_speed_rpm);
+        self.manoeuvre.current_request_a.hold(current_request_a);
+        self.manoeuvre.current_request_sine = None;
+    }
+
     /// Sets the ECU's wheel speed limit, rpm; the manoeuvre determines whether the vehicle obeys
     /// it.
     pub fn set_wheel_speed_limit_rpm(&mut self, limit_rpm: f64) {

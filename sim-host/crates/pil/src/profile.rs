@@ -49,6 +49,12 @@ impl Profile {
         }
     }
 
+    /// Replaces all knots by one value at all times.
+    pub fn hold(&mut self, value: f64) {
+        self.knots.clear();
+        self.knots.push((0.0, value));
+    }
+
     /// Checks that the times ascend from 0 or later, and that all values are from `min` to `max`.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use shared_model::signal::Measurement;
 use std::collections::VecDeque;
 
 /// Maximum delay of a measurement, control ticks.
-const MAX_DELAY_TICKS: usize = 100;
+pub const MAX_DELAY_TICKS: usize = 100;
 
 /// One value per sensor, in its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -52,6 +52,12 @@ impl ParameterSet<f64> for PerSensor {
             max: 1000.0,
             accessor: |p| &mut p.steering_rate_rad_per_s,
         },
+    ];
+    const DESCRIPTIONS: &'static [(&'static str, &'static str)] = &[
+        ("wheel_speed_rpm", "Of the wheel speed, rpm."),
+        ("yaw_rate_rad_per_s", "Of the yaw rate, rad/s."),
+        ("steering_angle_rad", "Of the steering angle, rad."),
+        ("steering_rate_rad_per_s", "Of the steering rate, rad/s."),
     ];
 }
 

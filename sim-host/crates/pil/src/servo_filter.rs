@@ -58,6 +58,16 @@ impl ParameterSet<f64> for ServoFilter {
             accessor: |p| &mut p.dither_limit_rad,
         },
     ];
+    const DESCRIPTIONS: &'static [(&'static str, &'static str)] = &[
+        (
+            "corner_rad_per_s",
+            "Corner of the low-pass for the torque and of the high-pass for the dither, rad/s.",
+        ),
+        (
+            "dither_limit_rad",
+            "Limit of the angle that the dither adds to the argument of the nonlinearities, rad.",
+        ),
+    ];
 }
 
 /// Both parts of the servo's voltage, as means over a PWM period. Their sum is the voltage.
