@@ -5,7 +5,7 @@ use pil::fault::catalogue::{self, Kind};
 use pil::fault::judge::{Detector, Reaction, Verdict};
 use pil::fault::memory::flips;
 use pil::fault::processor::{BENCH_TICKS, Bench};
-use pil::fault::processor_fault::{Action, Region};
+use pil::fault::processor_fault::{Action, ProcessorFault, Region};
 use pil::fault::row::Row;
 use pil::mil_sil_pil::Target;
 use qemu::Machine;
@@ -75,10 +75,15 @@ fn faults_of_the_core_are_detected() {
 #[test]
 fn faults_are_repeatable() {
     let bench = bench();
-    let flip = flips(&target().image, FLIPS, TICK..TICK + 10)[0];
-    let [a, b] = [(), ()].map(|()| bench.run(flip.action, flip.tick).expect("it runs"));
-    assert_eq!(a, b);
-    assert_ne!(a.packets, bench.fault_free());
+    let run = |flip: &ProcessorFault| bench.run(flip.action, flip.tick).expect("it runs");
+    let flips = flips(&target().image, FLIPS, TICK..TICK + 10);
+    // Not every bit is read again.
+    let found = flips.iter().map(|flip| (flip, run(flip)));
+    let (flip, first) = found
+        .into_iter()
+        .find(|(_, run)| run.packets != bench.fault_free())
+        .expect("a bit of the control task has an effect");
+    assert_eq!(first, run(flip));
 }
 
 #[test]

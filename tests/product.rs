@@ -302,7 +302,7 @@ fn a_bus_that_goes_silent_is_the_age_of_frames_and_a_host_that_returns_finds_the
     assert_eq!(actuation.mode, Mode::Safe);
     assert!(Faults::from_bits(actuation.faults).contains(Fault::FrameAge));
     run.ticks(200, without_frame);
-    assert_eq!(run.actuation().dither_amplitude_v, 0.0, "ramped out");
+    assert_eq!(run.actuation().dither_amplitude_v, 1.1, "kept");
     run.ticks(100, |packet| packet);
     assert_eq!(run.actuation().mode, Mode::Safe, "until restart");
 }
