@@ -83,8 +83,11 @@ impl Debugger<'_> {
     fn run_to_tick(&self, gdb: &mut Gdb, tick: u32) -> Result<(), SocketError> {
         let interrupt = self.addresses.control_interrupt;
         gdb.set_breakpoint(interrupt)?;
-        // An interrupt that is preempted at its first instruction stops there twice, so stops
-        // cannot be counted.
+        // Each interrupt before that of the tick stops here at least once.
+        for _ in 1..tick {
+            self.run_to_stop(gdb)?;
+        }
+        // One that is preempted at its first instruction stops there twice, so stops cannot be counted.
         while self.finished_ticks(gdb)? + 1 < tick || gdb.read_register(Register::Pc)? != interrupt
         {
             self.run_to_stop(gdb)?;
