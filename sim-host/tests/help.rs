@@ -21,13 +21,22 @@ const WITH_FIRMWARE: [&str; 6] = [
 ];
 /// Where the firmware's images are.
 const IMAGES: &str = "thumbv7em-none-eabihf";
-/// Examples of 15 s of work and more.
-const LONG: [&str; 5] = [
+/// Examples of some seconds of work and more.
+const LONG: [&str; 14] = [
     "sim-host reproduce --quick # everything in seconds",
     "sim-host reproduce # full quality, in target/reproduction",
     "sim-host reproduce --config vehicle.toml --out target/vehicle",
     "sim-host faults --quick",
     "sim-host schedule --out schedule_table.rs",
+    "sim-host schedule --from 1700 --to 1800 --csv schedule.csv --figure schedule.svg",
+    "sim-host schedule --config vehicle.toml --from 1500 --to 1600 --step 50 --margin 0.5 --json schedule.json",
+    "sim-host feedback --from 1750 --to 1750 --region --gain-from 2 --gain-to 12 --gain-step 2 --time 100 --out region.csv --figure region.svg",
+    "sim-host feedback --step 40 --out feedback.csv --figure feedback.svg",
+    "sim-host regions --from 1820 --to 1860 --step 1 --width 0.1 --transient 1000 --time 2000 --json regions.json",
+    "sim-host regions --from 1600 --to 1900 --step 5 --figure regions.svg # the paper's regions I to IV",
+    "sim-host map --speeds 64 --amplitudes 64 --out map.csv --parquet map.parquet --figure map.svg",
+    "sim-host averaging --dither square --amplitude-v 0.1",
+    "sim-host averaging --dither sine --amplitude-v 1 --from 500 --to 20000 --points 9 --figure averaging.svg",
 ];
 /// After this long work has begun, and bad arguments have been refused.
 const BEGUN: Duration = Duration::from_millis(800);
