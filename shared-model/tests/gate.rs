@@ -534,6 +534,24 @@ fn sr04_the_safe_state_keeps_the_dither_unless_its_path_is_faulty() {
     }
 }
 
+#[test]
+fn the_class_decides_on_the_dither() {
+    let keeping = Faults::that_keep_dither();
+    for fault in Fault::ALL {
+        assert_eq!(keeping.contains(fault), fault.class().keeps_dither());
+    }
+    let kept = [FaultClass::Sensor, FaultClass::Link, FaultClass::Command];
+    for class in FaultClass::ALL {
+        assert_eq!(
+            class.keeps_dither(),
+            kept.contains(&class),
+            "{}",
+            class.name()
+        );
+        assert!(Fault::ALL.iter().any(|fault| fault.class() == class));
+    }
+}
+
 /// A bit without a name may be anything.
 #[test]
 fn sr04_sr06_the_safe_state_ends_the_dither_at_a_later_fault_of_its_path() {
