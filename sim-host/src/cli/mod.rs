@@ -19,6 +19,8 @@ mod fmu;
 mod grid;
 mod groups;
 mod lyapunov;
+#[cfg(feature = "manuals")]
+mod manuals;
 mod map;
 mod nonlinearity;
 mod options;
@@ -96,6 +98,9 @@ enum Command {
     Image(firmware::image::Arguments),
     #[command(hide = true)]
     Qemu(firmware::run::Arguments),
+    #[cfg(feature = "manuals")]
+    #[command(hide = true)]
+    Manuals(manuals::Arguments),
 }
 
 /// Runs the command line.
@@ -160,6 +165,8 @@ fn run(command: Command) -> anyhow::Result<Outcome> {
         Command::Decode(arguments) => firmware::decode::run(&arguments),
         Command::Image(arguments) => firmware::image::run(&arguments),
         Command::Qemu(arguments) => firmware::run::run(&arguments),
+        #[cfg(feature = "manuals")]
+        Command::Manuals(arguments) => manuals::run(&arguments, Cli::command()),
     }
 }
 
