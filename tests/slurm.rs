@@ -10,8 +10,7 @@ use tests::slurm::{Cluster, signal};
 use tests::{root, sim_host};
 
 /// Sixteen tiles, each of about half a second.
-const PLAN: &str =
-    "--dither square --speeds 64 --amplitudes 32 --transient 200 --time 2000";
+const PLAN: &str = "--dither square --speeds 64 --amplitudes 32 --transient 200 --time 2000";
 const SHARDS: &str = "4";
 /// Time for each step of the test.
 const LIMIT: Duration = Duration::from_secs(60);
@@ -32,11 +31,18 @@ fn the_same_bytes_after_a_killed_shard_and_a_drained_node() {
     let task = |shard: u32| format!("{job}_{shard}");
 
     // A node is drained, and its shard computed elsewhere.
-    let of_task = |shard, format| cluster.query("squeue", &["-h", "-j", &task(shard), "-o", format]);
-    cluster.wait("a tile of shard 2", LIMIT, |_| tiles(&at("map/shard-2")) > 0);
+    let of_task =
+        |shard, format| cluster.query("squeue", &["-h", "-j", &task(shard), "-o", format]);
+    cluster.wait("a tile of shard 2", LIMIT, |_| {
+        tiles(&at("map/shard-2")) > 0
+    });
     let node = of_task(2, "%N");
     let node_is = |state: &str| {
-        let update = ["update", &format!("NodeName={node}"), &format!("State={state}")];
+        let update = [
+            "update",
+            &format!("NodeName={node}"),
+            &format!("State={state}"),
+        ];
         cluster.query("scontrol", &[&update[..], &["Reason=test"]].concat());
     };
     node_is("DRAIN");
@@ -49,7 +55,9 @@ fn the_same_bytes_after_a_killed_shard_and_a_drained_node() {
     node_is("RESUME");
 
     // The last task has the id of the array's job.
-    cluster.wait("a tile of shard 4", LIMIT, |_| tiles(&at("map/shard-4")) > 0);
+    cluster.wait("a tile of shard 4", LIMIT, |_| {
+        tiles(&at("map/shard-4")) > 0
+    });
     let processes = cluster.processes("sim-host map");
     let is_shard = |id: &&u32| {
         let line = fs::read(format!("/proc/{id}/cmdline")).unwrap_or_default();
@@ -65,7 +73,11 @@ fn the_same_bytes_after_a_killed_shard_and_a_drained_node() {
     let logs = [1, 2, 3, 4].map(|shard| log(&format!("shard-{shard}.log")));
     let restarts = logs.each_ref().map(|log| log.matches("restart 1").count());
     assert_eq!(restarts, [0, 1, 0, 1], "{logs:#?}");
-    assert!(logs[3].contains("status 137; it is requeued"), "{}", logs[3]);
+    assert!(
+        logs[3].contains("status 137; it is requeued"),
+        "{}",
+        logs[3]
+    );
 
     let whole = Command::new(sim_host())
         .args(["map", "--out", "map.csv", "--parquet", "map.parquet"])
@@ -76,7 +88,11 @@ fn the_same_bytes_after_a_killed_shard_and_a_drained_node() {
     assert!(whole.status.success(), "{whole:?}");
     for name in ["map.csv", "map.parquet"] {
         let merged = fs::read(at("map").join(name)).unwrap_or_default();
-        assert!(merged == fs::read(at(name)).unwrap(), "{name}: {}", log("merge.log"));
+        assert!(
+            merged == fs::read(at(name)).unwrap(),
+            "{name}: {}",
+            log("merge.log")
+        );
     }
 
     // A shard that fails is not requeued, and nothing is merged.
@@ -96,10 +112,15 @@ fn submit(cluster: &Cluster, folder: &Path, plan: &str) -> String {
     let mut command = cluster.command(root().join("examples/cluster/slurm-submit.sh"));
     let path = std::env::var("PATH").unwrap_or_default();
     command.env("PATH", format!("{programs}:{path}"));
-    command.arg(SHARDS).arg(folder).args(plan.split_whitespace());
+    command
+        .arg(SHARDS)
+        .arg(folder)
+        .args(plan.split_whitespace());
     let output = command.output().expect("it starts");
     let text = String::from_utf8_lossy(&output.stdout);
-    let job = text.strip_prefix("array job ").and_then(|rest| rest.split(',').next());
+    let job = text
+        .strip_prefix("array job ")
+        .and_then(|rest| rest.split(',').next());
     job.unwrap_or_else(|| panic!("{output:?}")).to_owned()
 }
 

@@ -61,9 +61,7 @@ impl Cluster {
             daemons: Vec::new(),
             folder,
         };
-        cluster
-            .start_daemons()
-            .map_err(|error| error.to_string())?;
+        cluster.start_daemons().map_err(|error| error.to_string())?;
         let idle = || cluster.query("sinfo", &["-h", "-N", "-o", "%t"]) == "idle\nidle";
         if until(START, idle) {
             Ok(cluster)
@@ -109,7 +107,12 @@ impl Cluster {
         let munged = Daemon::start("munged", &munge, &log)?;
         until(START, || path("munge/socket").exists());
         let file = path("slurm.conf").display().to_string();
-        let words = |words: &[&str]| words.iter().map(|&word| word.to_owned()).collect::<Vec<_>>();
+        let words = |words: &[&str]| {
+            words
+                .iter()
+                .map(|&word| word.to_owned())
+                .collect::<Vec<_>>()
+        };
         let controller = Daemon::start("slurmctld", &words(&["-D", "-f", &file]), &log)?;
         for node in NODES {
             let node = Daemon::start("slurmd", &words(&["-D", "-N", node, "-f", &file]), &log)?;
@@ -185,13 +188,24 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
     pub fn wait(&self, what: &str, limit: Duration, is_done: impl Fn(&Self) -> bool) {
         let done = until(limit, || {
             let delayed = self.query("squeue", &["-h", "-r", "-o", "%i %r"]);
-            for job in delayed.lines().filter_map(|line| line.strip_suffix(" BeginTime")) {
-                self.query("scontrol", &["update", &format!("JobId={job}"), "StartTime=now"]);
+            for job in delayed
+                .lines()
+                .filter_map(|line| line.strip_suffix(" BeginTime"))
+            {
+                self.query(
+                    "scontrol",
+                    &["update", &format!("JobId={job}"), "StartTime=now"],
+                );
             }
             is_done(self)
         });
         let queue = || self.query("squeue", &["-r"]);
-        assert!(done, "{what}: not after {limit:?}\n{}\n{}", queue(), self.log());
+        assert!(
+            done,
+            "{what}: not after {limit:?}\n{}\n{}",
+            queue(),
+            self.log()
+        );
     }
 
     /// Process ids of this cluster's jobs with a text in their command line.
@@ -204,7 +218,9 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
         let ids = processes.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok());
         let has = |id: u32, file: &str, part: &str| {
             let text = fs::read(format!("/proc/{id}/{file}")).unwrap_or_default();
-            String::from_utf8_lossy(&text).replace('\0', " ").contains(part)
+            String::from_utf8_lossy(&text)
+                .replace('\0', " ")
+                .contains(part)
         };
         ids.filter(|&id| has(id, "environ", &own) && has(id, "cmdline", part))
             .collect()
@@ -245,14 +261,21 @@ impl Daemon {
     fn start(program: &str, arguments: &[String], log: &Path) -> io::Result<Self> {
         let log = fs::File::options().create(true).append(true).open(log)?;
         let mut command = Command::new("timeout");
-        command.args(["--kill-after=5", MOST_LIFE_S, program]).args(arguments);
-        command.stdin(Stdio::null()).stdout(log.try_clone()?).stderr(log);
+        command
+            .args(["--kill-after=5", MOST_LIFE_S, program])
+            .args(arguments);
+        command
+            .stdin(Stdio::null())
+            .stdout(log.try_clone()?)
+            .stderr(log);
         Ok(Self(system(&mut command).spawn()?))
     }
 
     fn end(&mut self) {
         signal("TERM", self.0.id());
-        if !until(END, || self.0.try_wait().is_ok_and(|status| status.is_some())) {
+        if !until(END, || {
+            self.0.try_wait().is_ok_and(|status| status.is_some())
+        }) {
             let _ = self.0.kill();
             let _ = self.0.wait();
         }
@@ -290,6 +313,10 @@ fn system(command: &mut Command) -> &mut Command {
 }
 
 fn on_path(program: &str) -> bool {
-    let mut folders = paths().split(':').map(PathBuf::from).collect::<Vec<_>>().into_iter();
+    let mut folders = paths()
+        .split(':')
+        .map(PathBuf::from)
+        .collect::<Vec<_>>()
+        .into_iter();
     folders.any(|folder| folder.join(program).is_file())
 }

@@ -37,7 +37,10 @@ pub fn run() -> Result<()> {
     println!(
         "passed: the panic-free proof of the firmware for every board, the model's tests with overflow checks, all tests in release"
     );
-    let optional = [("the page in a browser", browser), ("the map on Slurm", slurm)];
+    let optional = [
+        ("the page in a browser", browser),
+        ("the map on Slurm", slurm),
+    ];
     for (what, outcome) in optional {
         if let Err(error) = outcome {
             println!("   UNTESTED: {what}: {error:#}");

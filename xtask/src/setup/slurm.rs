@@ -41,8 +41,5 @@ pub fn ensure() -> Result<()> {
 
 /// The steps of set-up.
 pub fn plan() -> String {
-    format!(
-        "set-up would: `apt-get install {}`",
-        PACKAGES.join(" ")
-    )
+    format!("set-up would: `apt-get install {}`", PACKAGES.join(" "))
 }
