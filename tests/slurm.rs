@@ -1,5 +1,5 @@
-//! A map computed on a Slurm cluster by the scripts of `examples/cluster/`: a shard that is killed,
-//! a node that is drained, and a plan that is not valid.
+//! A map computed on a Slurm cluster by the scripts of `examples/cluster/`: a shard near its time
+//! limit, one that is killed, a node that is drained, and a plan that is not valid.
 
 use std::fs;
 use std::io::Write as _;
@@ -9,14 +9,14 @@ use std::time::Duration;
 use tests::slurm::{Cluster, signal};
 use tests::{root, sim_host};
 
-/// Sixteen tiles, each of about half a second.
-const PLAN: &str = "--dither square --speeds 64 --amplitudes 32 --transient 200 --time 2000";
+/// 24 tiles, each of about half a second.
+const PLAN: &str = "--dither square --speeds 64 --amplitudes 48 --transient 200 --time 2000";
 const SHARDS: &str = "4";
 /// Time for each step of the test.
 const LIMIT: Duration = Duration::from_secs(60);
 
 #[test]
-fn the_same_bytes_after_a_killed_shard_and_a_drained_node() {
+fn the_same_bytes_after_stopped_and_killed_shards_and_a_drained_node() {
     let cluster = match Cluster::start() {
         Ok(cluster) => cluster,
         Err(reason) => {
@@ -29,6 +29,12 @@ fn the_same_bytes_after_a_killed_shard_and_a_drained_node() {
     let at = |name: &str| folder.path().join(name);
     let job = submit(&cluster, &at("map"), PLAN);
     let task = |shard: u32| format!("{job}_{shard}");
+
+    // The signal that Slurm sends to the script before the time limit.
+    cluster.wait("a tile of shard 1", LIMIT, |_| {
+        tiles(&at("map/shard-1")) > 0
+    });
+    signal("TERM", cluster.process(1, "slurm_script"));
 
     // A node is drained, and its shard computed elsewhere.
     let of_task =
@@ -58,13 +64,7 @@ fn the_same_bytes_after_a_killed_shard_and_a_drained_node() {
     cluster.wait("a tile of shard 4", LIMIT, |_| {
         tiles(&at("map/shard-4")) > 0
     });
-    let processes = cluster.processes("sim-host map");
-    let is_shard = |id: &&u32| {
-        let line = fs::read(format!("/proc/{id}/cmdline")).unwrap_or_default();
-        line.starts_with(b"sim-host") && String::from_utf8_lossy(&line).contains("shard-4")
-    };
-    let process = processes.iter().find(is_shard);
-    signal("KILL", *process.expect("shard 4 is running"));
+    signal("KILL", cluster.process(4, "sim-host map"));
 
     cluster.wait("the end of all jobs", LIMIT, |cluster| {
         cluster.query("squeue", &["-h"]).is_empty()
@@ -72,7 +72,8 @@ fn the_same_bytes_after_a_killed_shard_and_a_drained_node() {
     let log = |name: &str| fs::read_to_string(at("map").join(name)).unwrap_or_default();
     let logs = [1, 2, 3, 4].map(|shard| log(&format!("shard-{shard}.log")));
     let restarts = logs.each_ref().map(|log| log.matches("restart 1").count());
-    assert_eq!(restarts, [0, 1, 0, 1], "{logs:#?}");
+    assert_eq!(restarts, [1, 1, 0, 1], "{logs:#?}");
+    assert!(logs[0].contains("status 2; it is requeued"), "{}", logs[0]);
     assert!(
         logs[3].contains("status 137; it is requeued"),
         "{}",

@@ -208,22 +208,33 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
         );
     }
 
-    /// Process ids of this cluster's jobs with a text in their command line.
+    /// The process of an array job's task with a text in its command line.
     ///
     /// # Panics
-    /// If the processes cannot be listed.
-    pub fn processes(&self, part: &str) -> Vec<u32> {
+    /// If there is none.
+    pub fn process(&self, task: u32, command: &str) -> u32 {
+        let process = self.processes(&format!("SLURM_ARRAY_TASK_ID={task} "), command);
+        let first = process.into_iter().next();
+        first.unwrap_or_else(|| panic!("task {task} does not run {command}"))
+    }
+
+    /// Process ids of this cluster's jobs with a text in their environment and one in their command
+    /// line.
+    fn processes(&self, variable: &str, command: &str) -> Vec<u32> {
         let own = self.folder.path().display().to_string();
         let processes = fs::read_dir("/proc").expect("Linux has /proc");
         let ids = processes.filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok());
-        let has = |id: u32, file: &str, part: &str| {
+        let read = |id: u32, file: &str| {
             let text = fs::read(format!("/proc/{id}/{file}")).unwrap_or_default();
-            String::from_utf8_lossy(&text)
-                .replace('\0', " ")
-                .contains(part)
+            String::from_utf8_lossy(&text).replace('\0', " ")
         };
-        ids.filter(|&id| has(id, "environ", &own) && has(id, "cmdline", part))
-            .collect()
+        let is_job = |&id: &u32| {
+            let environment = read(id, "environ");
+            environment.contains(&own)
+                && environment.contains(variable)
+                && read(id, "cmdline").contains(command)
+        };
+        ids.filter(is_job).collect()
     }
 
     /// The end of the controller's log.
@@ -247,7 +258,7 @@ impl Drop for Cluster {
             daemon.end();
         }
         // Of jobs that Slurm could not end.
-        for id in self.processes("") {
+        for id in self.processes("", "") {
             signal("KILL", id);
         }
     }
