@@ -15,7 +15,9 @@ use parquet::record::RowAccessor;
 use shared_model::Scenario;
 use shared_model::dither::Waveform;
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
+use std::process::Stdio;
 
 /// A map of 288 cells in three tiles, the last one not full.
 const SMALL: &str = "map --speeds 12 --amplitudes 12 --transient 5 --time 15";
@@ -64,11 +66,47 @@ fn the_same_bytes_for_any_threads_interruptions_and_shards() {
     assert_refused(
         at,
         "map merge a --out o.csv",
-        &["1 of 3 tiles", "missing: 1"],
+        &[
+            "1 of 3 tiles",
+            "missing: 1;",
+            "repeat the `map` command",
+            "--shard",
+        ],
     );
     assert_well(at, "2", &format!("{SMALL} --shard 2/2 --work b"));
     assert_well(at, "1", &format!("map merge b a {}", files("merged")));
     assert_same(at, "one", "merged");
+}
+
+/// Peak memory of a merge in the middle of its table, kB.
+fn peak_of_merge_kb(work: &str, cells: usize, folder: &Path) -> usize {
+    let mut merge = command(folder, ["map", "merge", work, "--out", "-"]);
+    let mut merge = merge.stdout(Stdio::piped()).spawn().unwrap();
+    let mut rows = BufReader::new(merge.stdout.take().unwrap()).lines();
+    // The rest does not fit into the pipe, so that the program waits.
+    assert!(rows.nth(cells / 2).is_some());
+    let status = fs::read_to_string(format!("/proc/{}/status", merge.id())).unwrap();
+    let peak = status
+        .split_once("VmHWM:")
+        .and_then(|(_, rest)| rest.split_whitespace().next());
+    let peak = peak.expect("Linux reports it").parse().unwrap();
+    assert_eq!(rows.count(), cells - cells / 2);
+    assert!(merge.wait().unwrap().success());
+    peak
+}
+
+/// A hundred thousand cells would take 14 MB.
+#[test]
+fn the_memory_of_a_merge_does_not_grow_with_the_map() {
+    let folder = folder();
+    let at = folder.path();
+    let peaks = [100, 1000].map(|speeds| {
+        let plan = format!("--dither square --speeds {speeds} --amplitudes 100");
+        let run = format!("map {plan} --transient 0.1 --time 0.2 --work {speeds}");
+        assert_well(at, "2", &format!("{run} --shard 1/1"));
+        peak_of_merge_kb(&speeds.to_string(), speeds * 100, at)
+    });
+    assert!(peaks[1] < peaks[0] + 4_000, "{peaks:?} kB");
 }
 
 #[test]
@@ -78,10 +116,28 @@ fn tiles_of_another_plan_or_damaged_ones_are_refused() {
     let small = "map --dither square --speeds 12 --amplitudes 12 --transient 5";
     assert_well(at, "2", &format!("{small} --time 15 --work w"));
     let another = format!("{small} --time 16 --work w --out o.csv");
-    let parts = ["tiles of another map", "observed_s is 10.0, not 11.0"];
+    let parts = [
+        "tiles of another map",
+        "observed_s is 10.0, not 11.0",
+        "separate work folders",
+    ];
     assert_refused(at, &another, &parts);
     assert_well(at, "2", &format!("{small} --time 16 --work v --shard 1/1"));
-    assert_refused(at, "map merge w v --out o.csv", &["v", "another map"]);
+    let parts = [
+        "v holds tiles of another map",
+        "observed_s is 11.0, not 10.0",
+    ];
+    assert_refused(at, "map merge w v --out o.csv", &parts);
+    let second = "tile-000001.csv";
+    let own = fs::read(at.join("w").join(second)).unwrap();
+    fs::copy(at.join("v").join(second), at.join("w").join(second)).unwrap();
+    let parts = [second, "another map", "observed_s is 11.0, not 10.0"];
+    assert_refused(at, "map merge w --out o.csv", &parts);
+    fs::remove_file(at.join("w").join(second)).unwrap();
+    let parts = ["1 of 2 tiles are missing: 1;", "repeat the `map` command"];
+    assert_refused(at, "map merge w --out o.csv", &parts);
+    assert_refused(at, "map merge w none --out o.csv", &["cannot read none"]);
+    fs::write(at.join("w").join(second), own).unwrap();
     let tile = at.join("w/tile-000000.csv");
     let text = fs::read_to_string(&tile).unwrap();
     let (cut, _) = text.trim_end().rsplit_once('\n').unwrap();

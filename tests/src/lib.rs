@@ -2,6 +2,7 @@
 
 pub mod golden;
 pub mod python;
+pub mod slurm;
 
 use image::Image;
 use qemu::log::LogDecoder;

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail};
 
-use crate::setup::{browser, probe, python, qemu, target};
+use crate::setup::{browser, probe, python, qemu, slurm, target};
 use crate::{rustup, workspace};
 
 /// A required tool.
@@ -14,7 +14,7 @@ struct Item {
 
 /// Prints the table; an error if something is missing.
 pub fn run() -> Result<()> {
-    let items = [
+    let mut items = vec![
         toolchain()?,
         compiler_target(&probe::FIRMWARE)?,
         compiler_target(&probe::BROWSER)?,
@@ -23,6 +23,9 @@ pub fn run() -> Result<()> {
         python()?,
         browser()?,
     ];
+    if slurm::is_usable() {
+        items.push(slurm());
+    }
     let width = items
         .iter()
         .map(|item| item.need.len())
@@ -115,4 +118,11 @@ fn browser() -> Result<Item> {
         need: "browser of the page's test".to_owned(),
         state,
     })
+}
+
+fn slurm() -> Item {
+    Item {
+        need: "Slurm of the cluster's test".to_owned(),
+        state: slurm::found().ok_or_else(slurm::plan),
+    }
 }

@@ -1,10 +1,12 @@
-//! Prepares this machine: the compiler's targets, QEMU, and for the tests Python packages and a browser.
+//! Prepares this machine: the compiler's targets, QEMU, and for the tests Python packages, a browser
+//! and Slurm.
 
 pub mod browser;
 mod debian;
 pub mod probe;
 pub mod python;
 pub mod qemu;
+pub mod slurm;
 pub mod target;
 
 use anyhow::Result;

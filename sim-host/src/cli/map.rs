@@ -12,10 +12,10 @@ use dynamics::map::cell::{Cell, Kind};
 use dynamics::map::figure::draw;
 use dynamics::map::plan::{CELLS_A_TILE, Grid, Plan, Sheet, Start};
 use dynamics::map::table;
-use dynamics::map::tiles::{Folder, Shard, plan_of, put_together};
+use dynamics::map::tiles::{Folder, Merged, Shard, TilesError, plan_of};
 use dynamics::sweep::{RunControl, SweepError, Values};
 use dynamics::words::counted;
-use files::output::{self, Outputs, write_rows, write_text};
+use files::output::{self, Outputs, write_fallible_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
 use shared_model::dither::Waveform;
 use std::path::PathBuf;
@@ -163,9 +163,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         say!("the shard is complete: {}", work.display());
         return Ok(Outcome::Success);
     }
-    let cells = put_together(&[folder])?;
-    arguments.files.write(&plan, &cells)?;
-    show(&plan, &cells);
+    arguments.files.write(&plan, &[folder])?;
     say!(
         "tiles: {}; delete this folder when it is no longer needed",
         work.display()
@@ -282,9 +280,7 @@ impl Merge {
         let folders: Vec<Folder> = folders
             .map(|path| Folder::open(path, &plan))
             .collect::<Result<_, _>>()?;
-        let cells = put_together(&folders)?;
-        self.files.write(&plan, &cells)?;
-        show(&plan, &cells);
+        self.files.write(&plan, &folders)?;
         Ok(Outcome::Success)
     }
 }
@@ -303,36 +299,51 @@ impl Files {
         check(inputs, self.all().map(Some), self.force)
     }
 
-    fn write(&self, plan: &Plan, cells: &[Cell]) -> anyhow::Result<()> {
+    /// Writes the files from the tiles in some folders, and prints the shares of the regimes.
+    fn write(&self, plan: &Plan, folders: &[Folder]) -> anyhow::Result<()> {
+        let map = Merged::new(plan, folders)?;
+        // Reads all tiles, so that no file is begun if one of them is damaged.
+        let counts = count(plan, &map)?;
         if let Some(path) = &self.out {
-            write_rows(path, cells, self.force)?;
+            write_fallible_rows(path, map.cells(), self.force)?;
         }
         if let Some(path) = &self.parquet {
-            output::write(path, self.force, |to| Ok(table::write(plan, cells, to)?))?;
+            output::write(path, self.force, |to| {
+                Ok(table::write(plan, map.cells(), to)?)
+            })?;
         }
         if let Some(path) = &self.figure {
-            write_text(path, &draw(plan, cells), self.force)?;
+            let cells = map.cells().collect::<Result<Vec<Cell>, _>>()?;
+            write_text(path, &draw(plan, &cells), self.force)?;
         }
+        show(plan, &counts);
         Ok(())
     }
 }
 
-/// Shares of the regimes, sheet by sheet.
-fn show(plan: &Plan, cells: &[Cell]) {
-    for (sheet, cells) in plan
-        .sheets
-        .iter()
-        .zip(cells.chunks(cells.len() / plan.sheets.len()))
-    {
-        let share = |kind| {
-            let count = cells.iter().filter(|cell| cell.kind == kind).count();
-            100.0 * count as f64 / cells.len() as f64
-        };
+/// Cells of each regime in a sheet.
+type Counts = [usize; 5];
+
+/// Counts the regimes, sheet by sheet.
+fn count(plan: &Plan, map: &Merged) -> Result<Vec<Counts>, TilesError> {
+    let cells_a_sheet = plan.cells() / plan.sheets.len();
+    let mut counts = vec![Counts::default(); plan.sheets.len()];
+    for (index, cell) in map.cells().enumerate() {
+        counts[index / cells_a_sheet][cell?.kind as usize] += 1;
+    }
+    Ok(counts)
+}
+
+/// Prints the shares of the regimes, sheet by sheet.
+fn show(plan: &Plan, counts: &[Counts]) {
+    for (sheet, counts) in plan.sheets.iter().zip(counts) {
+        let cells: usize = counts.iter().sum();
+        let share = |kind: Kind| 100.0 * counts[kind as usize] as f64 / cells as f64;
         say!(
             "{:?} dither, {:?} initial state, {}: {:.1} % at rest, {:.1} % periodic, {:.1} % chaos, {:.1} % undecided, {:.1} % diverge",
             sheet.waveform,
             sheet.start,
-            counted(cells.len(), "cell"),
+            counted(cells, "cell"),
             share(Kind::Equilibrium),
             share(Kind::Periodic),
             share(Kind::Chaos),

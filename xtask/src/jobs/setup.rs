@@ -15,6 +15,9 @@ pub fn run() -> Result<()> {
         setup::target::ensure(&setup::probe::BROWSER)
     })?;
     stage("browser of the page's test", setup::browser::ensure)?;
+    if setup::slurm::is_usable() {
+        stage("Slurm of the cluster's test", setup::slurm::ensure)?;
+    }
     println!(
         "the firmware builds with toolchain {toolchain}; its runner is {}",
         workspace::sim_host()?.display()

@@ -21,6 +21,8 @@ pub fn run() -> Result<()> {
     })?;
     // Not every machine has a browser.
     let browser = stage("browser of the page's test", setup::browser::ensure);
+    // Nor is every user root.
+    let slurm = stage("Slurm of the cluster's test", setup::slurm::ensure);
     proofs::build(&toolchain)?;
     page::build(&for_browser)?;
     if target_cost::has_c_compiler() {
@@ -35,8 +37,14 @@ pub fn run() -> Result<()> {
     println!(
         "passed: the panic-free proof of the firmware for every board, the model's tests with overflow checks, all tests in release"
     );
-    if let Err(error) = browser {
-        println!("   UNTESTED: the page in a browser: {error:#}");
+    let optional = [
+        ("the page in a browser", browser),
+        ("the map on Slurm", slurm),
+    ];
+    for (what, outcome) in optional {
+        if let Err(error) = outcome {
+            println!("   UNTESTED: {what}: {error:#}");
+        }
     }
     println!("   slow proofs, not run: cargo xtask package, mutants, coverage, fuzz");
     Ok(())

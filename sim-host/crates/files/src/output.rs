@@ -16,6 +16,7 @@ mod place;
 use aside::Aside;
 use place::{Identity, Place};
 use serde::Serialize;
+use std::convert::Infallible;
 use std::error::Error;
 use std::fs::{self, File};
 use std::io::{BufWriter, IntoInnerError, Write};
@@ -230,10 +231,23 @@ pub fn write_rows(
     rows: impl IntoIterator<Item = impl Serialize>,
     force: bool,
 ) -> Result<(), WriteError> {
+    let rows = rows.into_iter().map(Ok::<_, Infallible>);
+    write_fallible_rows(path, rows, force)
+}
+
+/// Writes rows that are produced one at a time as CSV, as [`write_rows`].
+///
+/// # Errors
+/// As [`write()`]; the content fails at the first row that is an error.
+pub fn write_fallible_rows(
+    path: &Path,
+    rows: impl IntoIterator<Item = Result<impl Serialize, impl Into<ContentError>>>,
+    force: bool,
+) -> Result<(), WriteError> {
     write(path, force, |to| {
         let mut csv = csv::Writer::from_writer(to);
         for row in rows {
-            csv.serialize(row)?;
+            csv.serialize(row.map_err(Into::into)?)?;
         }
         Ok(csv.flush()?)
     })

@@ -2,6 +2,7 @@
 
 use super::cell::Cell;
 use super::plan::Plan;
+use super::tiles::TilesError;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
 use parquet::errors::ParquetError;
@@ -20,14 +21,18 @@ pub const PLAN_KEY: &str = "plan";
 const CHECKSUM_KEY: &str = "crc32";
 const CHECKSUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
 
+/// Cells of a group of rows: large enough for the compression of columns, small in memory.
+const CELLS_A_GROUP: usize = 131_072;
+
 /// A table cannot be written.
 #[derive(Debug, thiserror::Error)]
-#[error("the Parquet table cannot be written")]
-pub struct TableError(#[from] ParquetError);
-
-fn checksum(plan: &Plan, cells: &[Cell]) -> String {
-    let sum = CHECKSUM.checksum(json(&(plan, cells)).as_bytes());
-    format!("{sum:08x}")
+pub enum TableError {
+    /// The format's writer failed.
+    #[error("the Parquet table cannot be written")]
+    Parquet(#[from] ParquetError),
+    /// The cells cannot be read.
+    #[error(transparent)]
+    Tiles(#[from] TilesError),
 }
 
 fn json(value: &impl Serialize) -> String {
@@ -48,25 +53,47 @@ enum Values {
     CountsOrNone(Vec<Option<u32>>),
 }
 
-/// Writes the table. Its bytes depend on plan and cells alone.
+/// Writes the table in groups of rows, of which only one is in memory. Its bytes depend on plan and
+/// cells alone.
 ///
 /// # Errors
-/// If the writer fails.
-pub fn write(plan: &Plan, cells: &[Cell], to: impl Write + Send) -> Result<(), TableError> {
-    let columns = columns(cells);
-    let schema = schema(&columns)?;
-    let checksum = KeyValue::new(CHECKSUM_KEY.into(), checksum(plan, cells));
-    let plan = KeyValue::new(PLAN_KEY.into(), json(plan));
+/// If the writer fails, or a cell is an error.
+pub fn write(
+    plan: &Plan,
+    cells: impl Iterator<Item = Result<Cell, TilesError>>,
+    to: impl Write + Send,
+) -> Result<(), TableError> {
+    let plan = json(plan);
     let properties = WriterProperties::builder()
         .set_created_by(concat!("sim-host ", env!("CARGO_PKG_VERSION")).into())
-        .set_key_value_metadata(Some(vec![plan, checksum]))
+        .set_key_value_metadata(Some(vec![KeyValue::new(PLAN_KEY.into(), plan.clone())]))
         .build();
+    let schema = schema(&columns(&[]))?;
     let mut file = SerializedFileWriter::new(to, Arc::new(schema), Arc::new(properties))?;
-    let mut rows = file.next_row_group()?;
-    for column in &columns {
-        column.write(&mut rows)?;
+    // Of `[plan,[cell,...]]`.
+    let mut checksum = CHECKSUM.digest();
+    checksum.update(format!("[{plan},[").as_bytes());
+    let mut separator = "";
+    let mut group = Vec::new();
+    let mut cells = cells.peekable();
+    while let Some(cell) = cells.next() {
+        let cell = cell?;
+        checksum.update(separator.as_bytes());
+        checksum.update(json(&cell).as_bytes());
+        separator = ",";
+        group.push(cell);
+        if group.len() == CELLS_A_GROUP || cells.peek().is_none() {
+            let mut rows = file.next_row_group()?;
+            for column in columns(&group) {
+                column.write(&mut rows)?;
+            }
+            rows.close()?;
+            group.clear();
+        }
     }
-    rows.close()?;
+    checksum.update(b"]]");
+    let checksum = format!("{:08x}", checksum.finalize());
+    file.append_key_value_metadata(KeyValue::new(CHECKSUM_KEY.into(), checksum));
     file.close()?;
     Ok(())
 }
@@ -189,4 +216,68 @@ fn levels<T>(values: &[Option<T>]) -> Vec<i16> {
         .iter()
         .map(|value| i16::from(value.is_some()))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::cell::Kind;
+    use crate::map::plan::{Grid, Sheet, Start};
+    use crate::sweep::Timing;
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::RowAccessor;
+    use shared_model::Scenario;
+    use shared_model::dither::Waveform;
+
+    fn plan(speeds: usize) -> Plan {
+        let grid = |from, to, count| Grid { from, to, count };
+        let sheet = Sheet {
+            waveform: Waveform::Square,
+            start: Start::Given,
+            amplitudes_v: grid(0.0, 0.1, 2),
+        };
+        let speeds_rpm = grid(1000.0, 2000.0, speeds);
+        let timing = Timing::new(1.0, 3.0).unwrap();
+        Plan::new(Scenario::reconstruction(), vec![sheet], speeds_rpm, timing).unwrap()
+    }
+
+    fn cell(number: usize) -> Cell {
+        Cell {
+            waveform: Waveform::Square,
+            start: Start::Given,
+            wheel_speed_rpm: number as f64,
+            dither_amplitude_v: 0.0,
+            kind: Kind::Periodic,
+            period: Some(1),
+            bands: None,
+            exponent_per_s: None,
+            exponent_standard_error_per_s: None,
+            exponent_threshold_per_s: None,
+            yaw_rate_peak_to_peak_rad_per_s: None,
+            steering_angle_peak_to_peak_rad: None,
+            diverges_at_s: None,
+        }
+    }
+
+    /// All rows in order, and the check sum of plan and cells as one JSON text.
+    #[test]
+    fn rows_beyond_a_group_are_in_the_next_one() {
+        let cells: Vec<Cell> = (0..CELLS_A_GROUP + 2).map(cell).collect();
+        let plan = plan(cells.len() / 2);
+        let mut file = tempfile::tempfile().unwrap();
+        write(&plan, cells.iter().map(|&cell| Ok(cell)), &mut file).unwrap();
+        let table = SerializedFileReader::new(file).unwrap();
+        let metadata = table.metadata();
+        let rows = |group: usize| metadata.row_group(group).num_rows();
+        assert_eq!(metadata.num_row_groups(), 2);
+        assert_eq!([rows(0), rows(1)], [CELLS_A_GROUP as i64, 2]);
+        let keys = metadata.file_metadata().key_value_metadata().unwrap();
+        let checksum = keys.iter().find(|pair| pair.key == CHECKSUM_KEY).unwrap();
+        let text = json(&(&plan, &cells));
+        let expected = format!("{:08x}", CHECKSUM.checksum(text.as_bytes()));
+        assert_eq!(checksum.value.as_ref(), Some(&expected));
+        let speeds = table.get_row_iter(None).unwrap();
+        let speeds = speeds.map(|row| row.unwrap().get_double(2).unwrap());
+        assert!(speeds.eq(cells.iter().map(|cell| cell.wheel_speed_rpm)));
+    }
 }

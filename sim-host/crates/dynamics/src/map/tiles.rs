@@ -36,7 +36,7 @@ pub enum TilesError {
     },
     /// The folder holds tiles of another plan.
     #[error(
-        "{} holds tiles of another map: {differences}; give another --work, or delete them",
+        "{} holds tiles of another map: {differences}; each map needs separate work folders",
         path.display()
     )]
     OtherMap {
@@ -63,7 +63,10 @@ pub enum TilesError {
     #[error("{} has no tiles", .0.display())]
     NoTiles(PathBuf),
     /// Tiles are missing.
-    #[error("{missing} of {tiles} tiles are missing: {first}")]
+    #[error(
+        "{missing} of {tiles} tiles are missing: {first}; repeat the `map` command of each --shard with its --work, \
+         which computes only missing tiles, then merge all work folders"
+    )]
     Missing {
         /// How many.
         missing: usize,
@@ -205,7 +208,7 @@ impl<'a> Folder<'a> {
     }
 
     fn file(&self, tile: usize) -> PathBuf {
-        self.path.join(format!("tile-{tile:06}.csv"))
+        self.path.join(file_name(tile))
     }
 
     fn write(&self, tile: usize, cells: &[Cell]) -> Result<(), TilesError> {
@@ -307,48 +310,97 @@ pub fn plan_of(path: &Path) -> Result<Plan, TilesError> {
     Ok(read(&tile)?.0.plan)
 }
 
-/// All cells of a map from tiles in one or several folders, in the map's order.
-///
-/// # Errors
-/// If a tile is in none of them, or one is of another plan or damaged.
-pub fn put_together(folders: &[Folder]) -> Result<Vec<Cell>, TilesError> {
-    let Some(plan) = folders.first().map(|folder| folder.plan) else {
-        return Ok(Vec::new());
-    };
-    let holder = |tile| folders.iter().find(|folder| folder.file(tile).exists());
-    let all = 0..plan.tiles();
-    let missing: Vec<_> = all.clone().filter(|&tile| holder(tile).is_none()).collect();
-    if !missing.is_empty() {
-        let named: Vec<_> = missing.iter().take(NAMED).map(usize::to_string).collect();
-        let more = if missing.len() > NAMED { ", ..." } else { "" };
-        return Err(TilesError::Missing {
-            missing: missing.len(),
-            tiles: plan.tiles(),
-            first: named.join(", ") + more,
-        });
+/// A whole map in the tiles of one or several folders. Tiles are read one at a time, so that memory
+/// hardly grows with the map: four bytes per tile.
+#[derive(Debug)]
+pub struct Merged<'a> {
+    folders: &'a [Folder<'a>],
+    /// Index of the folder of each tile.
+    holders: Vec<u32>,
+}
+
+impl<'a> Merged<'a> {
+    /// The map of a plan, from folders of its tiles. Of a tile in several folders, that of the first
+    /// is taken.
+    ///
+    /// # Errors
+    /// If a tile is in none of them, or a folder cannot be read.
+    pub fn new(plan: &Plan, folders: &'a [Folder<'a>]) -> Result<Self, TilesError> {
+        const NONE: u32 = u32::MAX;
+        let mut holders = vec![NONE; plan.tiles()];
+        for (index, folder) in (0..).zip(folders) {
+            each_tile(&folder.path, |file| {
+                let tile = number(file).and_then(|number| holders.get_mut(number));
+                if let Some(holder) = tile.filter(|holder| **holder == NONE) {
+                    *holder = index;
+                }
+            })?;
+        }
+        let missing = || (0..holders.len()).filter(|&tile| holders[tile] == NONE);
+        let count = missing().count();
+        if count > 0 {
+            let named: Vec<_> = missing().take(NAMED).map(|n| n.to_string()).collect();
+            let more = if count > NAMED { ", ..." } else { "" };
+            return Err(TilesError::Missing {
+                missing: count,
+                tiles: holders.len(),
+                first: named.join(", ") + more,
+            });
+        }
+        Ok(Self { folders, holders })
     }
-    let mut cells = Vec::with_capacity(plan.cells());
-    for (tile, folder) in all.filter_map(|tile| Some((tile, holder(tile)?))) {
-        cells.extend(folder.read(tile)?);
+
+    /// All cells in the map's order. An error is the last item.
+    pub fn cells(&self) -> impl Iterator<Item = Result<Cell, TilesError>> {
+        let read = |(tile, &folder): (usize, &u32)| self.folders[folder as usize].read(tile);
+        let tiles = self.holders.iter().enumerate().map(read);
+        tiles.flat_map(|tile| {
+            let (cells, error) = match tile {
+                Ok(cells) => (cells, None),
+                Err(error) => (Vec::new(), Some(error)),
+            };
+            cells.into_iter().map(Ok).chain(error.map(Err))
+        })
     }
-    Ok(cells)
 }
 
 /// The first tile's file of a folder, by name.
 fn first_tile(path: &Path) -> Result<Option<PathBuf>, TilesError> {
-    let files = fs::read_dir(path).and_then(|entries| {
-        let paths = entries.map(|entry| Ok(entry?.path()));
-        paths.collect::<std::io::Result<Vec<_>>>()
-    });
-    let files = files.map_err(|source| TilesError::Folder {
+    let mut first: Option<PathBuf> = None;
+    each_tile(path, |file| {
+        if first.as_deref().is_none_or(|first| file < first) {
+            first = Some(file.into());
+        }
+    })?;
+    Ok(first)
+}
+
+/// Calls a function with each tile's file of a folder, in no order.
+fn each_tile(path: &Path, mut on_tile: impl FnMut(&Path)) -> Result<(), TilesError> {
+    let unreadable = |source| TilesError::Folder {
         path: path.into(),
         source,
-    })?;
-    let is_tile = |file: &PathBuf| {
-        let name = file.file_name().unwrap_or_default().to_string_lossy();
-        name.starts_with("tile-") && name.ends_with(".csv")
     };
-    Ok(files.into_iter().filter(is_tile).min())
+    for entry in fs::read_dir(path).map_err(unreadable)? {
+        let file = entry.map_err(unreadable)?.path();
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with("tile-") && name.ends_with(".csv") {
+            on_tile(&file);
+        }
+    }
+    Ok(())
+}
+
+/// The number of the tile that a file has by its name.
+fn number(file: &Path) -> Option<usize> {
+    let name = file.file_name()?.to_str()?;
+    let number = name.strip_prefix("tile-")?.strip_suffix(".csv")?;
+    let number = number.parse().ok()?;
+    (file_name(number) == name).then_some(number)
+}
+
+fn file_name(tile: usize) -> String {
+    format!("tile-{tile:06}.csv")
 }
 
 #[cfg(test)]
