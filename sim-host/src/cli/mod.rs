@@ -20,6 +20,7 @@ mod grid;
 mod groups;
 mod lyapunov;
 mod map;
+mod measurement;
 mod nonlinearity;
 mod options;
 mod orbit;

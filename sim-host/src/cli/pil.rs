@@ -2,12 +2,13 @@
 
 use super::emulator::{link_kinds, machines, open_image};
 use super::firmware::find;
+use super::measurement::drive;
 use super::options::{time_out, waveform};
 use super::outcome::Outcome;
 use super::output::{Destinations, check, named};
 use super::pil_replay;
 use anyhow::{Context, ensure};
-use dynamics::config::validate;
+use dynamics::config::{to_toml, validate};
 use files::output::{self, write_json, write_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
 use pil::can_log;
@@ -17,6 +18,7 @@ use pil::manoeuvre::{self, Manoeuvre};
 use pil::mil_sil_pil::{MilSilPil, Target, run_all};
 use pil::profile::Profile;
 use pil::recording::Recording;
+use pil::sensed_plant::lead_in_periods;
 use pil::vehicle_node::ecu_scenario;
 use qemu::Machine;
 use qemu::session::LinkKind;
@@ -42,6 +44,7 @@ use std::path::{Path, PathBuf};
   sim-host pil --scenario examples/manoeuvres/speed-ramp.toml \\
       --record ramp.loop --out ramp.csv
   sim-host pil --replay ramp.loop       # the recorded run, without QEMU
+  sim-host pil --mdf4 drive.mf4         # for tools that read MDF 4
   sim-host pil --can-log drive.log      # its frames, as candump writes them
   sim-host pil --replay drive.log --out drive.csv       # the ECU fed with them
   sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
@@ -77,9 +80,13 @@ pub struct Arguments {
     /// candump; docs/dithersteer.dbc names the signals
     #[arg(long, value_name = "FILE")]
     can_log: Option<PathBuf>,
+    /// Write the drive as a measurement file (ASAM MDF 4.10): vehicle and actuator frame at each
+    /// control tick, the duty codes in each PWM period
+    #[arg(long, value_name = "FILE")]
+    mdf4: Option<PathBuf>,
     /// Replay a recorded run without QEMU, and compare; or feed the ECU's program with the sensor
     /// frames of a bus log (candump or ASC), with the configuration of --scenario
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["rpm", "dither", "time", "record", "can_log", "json", "figure"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["rpm", "dither", "time", "record", "can_log", "mdf4", "json", "figure"])]
     replay: Option<PathBuf>,
     #[command(flatten)]
     files: Destinations,
@@ -217,6 +224,7 @@ impl Arguments {
         let of_one = [
             named("--record", record),
             named("--can-log", can_log),
+            named("--mdf4", &self.mdf4),
             out,
             figure,
         ];
@@ -252,6 +260,12 @@ impl Arguments {
             output::write(path, self.files.force, |to| {
                 Ok(can_log::write(&run.exchanges, rate_hz, format, to)?)
             })?;
+        }
+        if let Some(path) = &self.mdf4 {
+            let comment = format!("{}\n\n{}", manoeuvre.name, to_toml(scenario));
+            let lead_in = lead_in_periods(scenario, manoeuvre) as usize;
+            let rate_hz = scenario.run.pwm_rate_hz;
+            drive::write(run, lead_in, rate_hz, comment, path, self.files.force)?;
         }
         if let Some(path) = &self.files.out {
             write_rows(path, &run.records, self.files.force)?;
