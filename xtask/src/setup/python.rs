@@ -1,4 +1,4 @@
-//! Python packages that frames, units and measurement files are checked against, in a virtual
+//! Python packages that frames, units, measurement files and maps are checked against, in a virtual
 //! environment of their own: nothing is installed into the machine's Python.
 
 use std::fs;
@@ -11,11 +11,9 @@ use crate::host::{Apt, Manager};
 use crate::{process, workspace};
 
 /// Purpose of the packages.
-const PURPOSE: &str =
-    "the comparison of frames, units and measurement files with autosar-e2e, cantools, fmpy and asammdf";
+const PURPOSE: &str = "the comparison of frames, units, measurement files and maps with other programs that read them";
 /// Prints the version if the packages can be imported.
-const PROBE: &str =
-    "import platform, asammdf, cantools, e2e, fmpy.fmi2; print('Python', platform.python_version())";
+const PROBE: &str = "import platform, asammdf, cantools, duckdb, e2e, fmpy.fmi2, polars, pyarrow; print('Python', platform.python_version())";
 /// Where Debian splits Python, the package that brings `python3 -m venv`.
 const DEBIAN_PACKAGE: &str = "python3-venv";
 

@@ -1,6 +1,6 @@
 //! Channels by their names, which carry the unit.
 
-use fmu::unit::Unit;
+use dynamics::unit::Unit;
 use mdf4::{Channel, Samples};
 use shared_model::friction::FrictionMode;
 use std::fmt::Debug;
