@@ -9,6 +9,7 @@ use super::output::{Destinations, check, named};
 use super::pil_replay;
 use anyhow::{Context, ensure};
 use dynamics::config::{to_toml, validate};
+use files::input;
 use files::output::{self, write_json, write_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
 use pil::can_log;
@@ -77,7 +78,7 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Write the frames of both directions as a log of the bus: ASC for a name in .asc, else that of
-    /// candump; docs/dithersteer.dbc names the signals
+    /// candump. The CAN database that names the signals is written beside it, with the ending .dbc
     #[arg(long, value_name = "FILE")]
     can_log: Option<PathBuf>,
     /// Write the drive as a measurement file (ASAM MDF 4.10): vehicle and actuator frame at each
@@ -104,7 +105,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let time_out = time_out(arguments.time_out)?;
     let manoeuvres = arguments.manoeuvres()?;
     let firmware = arguments.firmware();
-    arguments.check_outputs(manoeuvres.len(), firmware.as_deref().ok())?;
+    let database = arguments.database();
+    arguments.check_outputs(manoeuvres.len(), firmware.as_deref().ok(), &database)?;
     let target = Target {
         image: open_image(&firmware?)?,
         machine: arguments.machine,
@@ -117,6 +119,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         let runs =
             with_progress(scenario, manoeuvre, &target).with_context(|| manoeuvre.name.clone())?;
         arguments.write(scenario, manoeuvre, &runs)?;
+        if let Some(path) = &database {
+            write_text(path, can_log::DATABASE, arguments.files.force)?;
+        }
         // Only the summary is stored, because a run may be long.
         summaries.push(Summary::of(&runs));
     }
@@ -218,7 +223,12 @@ impl Arguments {
     }
 
     /// Rejects invalid outputs before the work begins.
-    fn check_outputs(&self, manoeuvres: usize, firmware: Option<&Path>) -> anyhow::Result<()> {
+    fn check_outputs(
+        &self,
+        manoeuvres: usize,
+        firmware: Option<&Path>,
+        database: &Option<PathBuf>,
+    ) -> anyhow::Result<()> {
         let [out, json, figure] = self.files.files();
         let (record, can_log) = (&self.record, &self.can_log);
         let of_one = [
@@ -237,8 +247,20 @@ impl Arguments {
         let scenarios = self.scenario.iter();
         let firmware = firmware.map(|firmware| ("--firmware", firmware));
         let inputs = scenarios.map(|file| ("--scenario", file.as_path()));
-        let files = of_one.into_iter().chain([json]);
+        let database = named("the CAN database of --can-log", database);
+        let files = of_one.into_iter().chain([json, database]);
         check(inputs.chain(firmware), files, self.files.force).map(drop)
+    }
+
+    /// The file beside the log for the CAN database, unless it is there; none for a pipe or a device.
+    fn database(&self) -> Option<PathBuf> {
+        let log = self.can_log.as_deref().filter(|log| output::is_file(log))?;
+        let path = log.with_extension("dbc");
+        let is_there = output::is_file(&path)
+            && input::read(&path, input::TEXT_BYTES, |_| true)
+                .is_ok_and(|bytes| bytes == can_log::DATABASE.as_bytes());
+        // The log itself is another file than the database, whatever it is now.
+        (!is_there || path == log).then_some(path)
     }
 
     fn write(
