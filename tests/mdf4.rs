@@ -390,7 +390,7 @@ fn special() -> (Vec<u8>, Expected) {
         samples,
     };
     let names = vec![(0, "none".to_owned()), (200, "größer".to_owned())];
-    let of = |k: usize| if k % 2 == 0 { 200 } else { 0 };
+    let of = |k: usize| if k.is_multiple_of(2) { 200 } else { 0 };
     let group = |name: &str, records| Group {
         name: name.into(),
         records,
