@@ -11,7 +11,7 @@ use std::process::Stdio;
 /// Each subcommand that writes files, with the options that name them. What they read need not be
 /// there: outputs come first.
 const WRITERS: [(&str, &[&str]); 24] = [
-    ("simulate", &["--out"]),
+    ("simulate", &["--out", "--mdf4"]),
     ("lyapunov", &["--out", "--json", "--figure"]),
     (
         "averaging --dither square --amplitude-v 0.1",
@@ -38,8 +38,18 @@ const WRITERS: [(&str, &[&str]); 24] = [
     ("schedule", &["--out", "--csv", "--json", "--figure"]),
     ("realisability", &["--out", "--json", "--figure"]),
     ("faults", &["--out", "--json", "--figure"]),
-    ("decode run.bin", &["--out"]),
-    ("pil", &["--record", "--out", "--json", "--figure"]),
+    ("decode run.bin", &["--out", "--mdf4"]),
+    (
+        "pil",
+        &[
+            "--record",
+            "--can-log",
+            "--mdf4",
+            "--out",
+            "--json",
+            "--figure",
+        ],
+    ),
     ("fmu ecu", &["--out"]),
 ];
 

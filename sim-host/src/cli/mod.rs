@@ -22,6 +22,7 @@ mod lyapunov;
 #[cfg(feature = "manuals")]
 mod manuals;
 mod map;
+mod measurement;
 mod nonlinearity;
 mod options;
 mod orbit;

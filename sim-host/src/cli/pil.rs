@@ -2,12 +2,14 @@
 
 use super::emulator::{link_kinds, machines, open_image};
 use super::firmware::find;
+use super::measurement::drive;
 use super::options::{time_out, waveform};
 use super::outcome::Outcome;
 use super::output::{Destinations, check, named};
 use super::pil_replay;
 use anyhow::{Context, ensure};
-use dynamics::config::validate;
+use dynamics::config::{to_toml, validate};
+use files::input;
 use files::output::{self, write_json, write_rows, write_text};
 use indicatif::{ProgressBar, ProgressStyle};
 use pil::can_log;
@@ -17,6 +19,7 @@ use pil::manoeuvre::{self, Manoeuvre};
 use pil::mil_sil_pil::{MilSilPil, Target, run_all};
 use pil::profile::Profile;
 use pil::recording::Recording;
+use pil::sensed_plant::lead_in_periods;
 use pil::vehicle_node::ecu_scenario;
 use qemu::Machine;
 use qemu::session::LinkKind;
@@ -42,6 +45,7 @@ use std::path::{Path, PathBuf};
   sim-host pil --scenario examples/manoeuvres/speed-ramp.toml \\
       --record ramp.loop --out ramp.csv
   sim-host pil --replay ramp.loop       # the recorded run, without QEMU
+  sim-host pil --mdf4 drive.mf4         # for tools that read MDF 4
   sim-host pil --can-log drive.log      # its frames, as candump writes them
   sim-host pil --replay drive.log --out drive.csv       # the ECU fed with them
   sim-host pil --scenario examples/manoeuvres/*.toml    # a table over all
@@ -74,12 +78,16 @@ pub struct Arguments {
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Write the frames of both directions as a log of the bus: ASC for a name in .asc, else that of
-    /// candump; docs/dithersteer.dbc names the signals
+    /// candump. The CAN database that names the signals is written beside it, with the ending .dbc
     #[arg(long, value_name = "FILE")]
     can_log: Option<PathBuf>,
+    /// Write the drive as a measurement file (ASAM MDF 4.10): vehicle and actuator frame at each
+    /// control tick, the duty codes in each PWM period
+    #[arg(long, value_name = "FILE")]
+    mdf4: Option<PathBuf>,
     /// Replay a recorded run without QEMU, and compare; or feed the ECU's program with the sensor
     /// frames of a bus log (candump or ASC), with the configuration of --scenario
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["rpm", "dither", "time", "record", "can_log", "json", "figure"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["rpm", "dither", "time", "record", "can_log", "mdf4", "json", "figure"])]
     replay: Option<PathBuf>,
     #[command(flatten)]
     files: Destinations,
@@ -97,7 +105,8 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
     let time_out = time_out(arguments.time_out)?;
     let manoeuvres = arguments.manoeuvres()?;
     let firmware = arguments.firmware();
-    arguments.check_outputs(manoeuvres.len(), firmware.as_deref().ok())?;
+    let database = arguments.database();
+    arguments.check_outputs(manoeuvres.len(), firmware.as_deref().ok(), &database)?;
     let target = Target {
         image: open_image(&firmware?)?,
         machine: arguments.machine,
@@ -110,6 +119,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<Outcome> {
         let runs =
             with_progress(scenario, manoeuvre, &target).with_context(|| manoeuvre.name.clone())?;
         arguments.write(scenario, manoeuvre, &runs)?;
+        if let Some(path) = &database {
+            write_text(path, can_log::DATABASE, arguments.files.force)?;
+        }
         // Only the summary is stored, because a run may be long.
         summaries.push(Summary::of(&runs));
     }
@@ -211,12 +223,18 @@ impl Arguments {
     }
 
     /// Rejects invalid outputs before the work begins.
-    fn check_outputs(&self, manoeuvres: usize, firmware: Option<&Path>) -> anyhow::Result<()> {
+    fn check_outputs(
+        &self,
+        manoeuvres: usize,
+        firmware: Option<&Path>,
+        database: &Option<PathBuf>,
+    ) -> anyhow::Result<()> {
         let [out, json, figure] = self.files.files();
         let (record, can_log) = (&self.record, &self.can_log);
         let of_one = [
             named("--record", record),
             named("--can-log", can_log),
+            named("--mdf4", &self.mdf4),
             out,
             figure,
         ];
@@ -229,8 +247,20 @@ impl Arguments {
         let scenarios = self.scenario.iter();
         let firmware = firmware.map(|firmware| ("--firmware", firmware));
         let inputs = scenarios.map(|file| ("--scenario", file.as_path()));
-        let files = of_one.into_iter().chain([json]);
+        let database = named("the CAN database of --can-log", database);
+        let files = of_one.into_iter().chain([json, database]);
         check(inputs.chain(firmware), files, self.files.force).map(drop)
+    }
+
+    /// The file beside the log for the CAN database, unless it is there; none for a pipe or a device.
+    fn database(&self) -> Option<PathBuf> {
+        let log = self.can_log.as_deref().filter(|log| output::is_file(log))?;
+        let path = log.with_extension("dbc");
+        let is_there = output::is_file(&path)
+            && input::read(&path, input::TEXT_BYTES, |_| true)
+                .is_ok_and(|bytes| bytes == can_log::DATABASE.as_bytes());
+        // The log itself is another file than the database, whatever it is now.
+        (!is_there || path == log).then_some(path)
     }
 
     fn write(
@@ -252,6 +282,12 @@ impl Arguments {
             output::write(path, self.files.force, |to| {
                 Ok(can_log::write(&run.exchanges, rate_hz, format, to)?)
             })?;
+        }
+        if let Some(path) = &self.mdf4 {
+            let comment = format!("{}\n\n{}", manoeuvre.name, to_toml(scenario));
+            let lead_in = lead_in_periods(scenario, manoeuvre) as usize;
+            let rate_hz = scenario.run.pwm_rate_hz;
+            drive::write(run, lead_in, rate_hz, comment, path, self.files.force)?;
         }
         if let Some(path) = &self.files.out {
             write_rows(path, &run.records, self.files.force)?;

@@ -1,5 +1,5 @@
-//! Python packages that frames and units are checked against, in a virtual environment of their own:
-//! nothing is installed into the machine's Python.
+//! Python packages that frames, units, measurement files and maps are checked against, in a virtual
+//! environment of their own: nothing is installed into the machine's Python.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,10 +11,9 @@ use crate::host::{Apt, Manager};
 use crate::{process, workspace};
 
 /// Purpose of the packages.
-const PURPOSE: &str = "the comparison of frames and units with autosar-e2e, cantools and fmpy";
+const PURPOSE: &str = "the comparison of frames, units, measurement files and maps with other programs that read them";
 /// Prints the version if the packages can be imported.
-const PROBE: &str =
-    "import platform, cantools, e2e, fmpy.fmi2; print('Python', platform.python_version())";
+const PROBE: &str = "import platform, asammdf, cantools, duckdb, e2e, fmpy.fmi2, polars, pyarrow; print('Python', platform.python_version())";
 /// Where Debian splits Python, the package that brings `python3 -m venv`.
 const DEBIAN_PACKAGE: &str = "python3-venv";
 

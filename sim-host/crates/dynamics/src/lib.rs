@@ -33,6 +33,7 @@ pub mod sweep;
 pub mod synchronisation;
 pub mod trace_csv;
 pub mod two_particle;
+pub mod unit;
 pub mod words;
 
 pub use measures::{period, trace};

@@ -1,8 +1,8 @@
 //! The model description: `modelDescription.xml` of a unit.
 
 use crate::model::Model;
-use crate::unit;
 use crate::variable::{Causality, Range, Value, Variable};
+use dynamics::unit;
 use quick_xml::Writer;
 use quick_xml::writer::ElementWriter;
 use shared_model::Scenario;

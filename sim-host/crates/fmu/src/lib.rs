@@ -10,6 +10,5 @@ mod instance;
 mod location;
 pub mod model;
 mod parameters;
-pub mod unit;
 pub mod variable;
 mod vehicle;

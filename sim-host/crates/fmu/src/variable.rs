@@ -1,6 +1,6 @@
 //! Variables of a unit: what the model description lists and an instance holds.
 
-use crate::unit::Unit;
+use dynamics::unit::Unit;
 use shared_model::short::Short;
 
 /// A value. Enumerations have the numbers of their alternatives.

@@ -26,7 +26,13 @@ fn lead_in_ticks(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u32 {
     (slewing_s * scenario.run.control_rate_hz + SPARE_TICKS).ceil() as u32
 }
 
-/// Those of them in which the ECU is active.
+/// PWM periods of the lead-in.
+pub fn lead_in_periods(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u32 {
+    let ticks = lead_in_ticks(scenario, manoeuvre);
+    scenario.periods_per_tick().saturating_mul(ticks)
+}
+
+/// Those ticks in which the ECU is active.
 pub(crate) fn active_lead_in_ticks(scenario: &Scenario<f64>, manoeuvre: &Manoeuvre) -> u32 {
     lead_in_ticks(scenario, manoeuvre).saturating_sub(START_TICKS)
 }
@@ -57,7 +63,7 @@ impl SensedPlant {
             sensors: Sensors::new(&manoeuvre.sensors),
             periods_per_tick,
             periods: 0,
-            lead_in_periods: periods_per_tick.saturating_mul(lead_in_ticks(scenario, manoeuvre)),
+            lead_in_periods: lead_in_periods(scenario, manoeuvre),
         })
     }
 

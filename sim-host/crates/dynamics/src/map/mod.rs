@@ -12,6 +12,7 @@
 //! A map is made in tiles, each kept as a file of its own as soon as it is done. What a cell holds
 //! depends on the plan alone: not on threads, on interruptions, or on where its tile was made.
 
+mod arrow_schema;
 pub mod cell;
 mod curves;
 pub mod figure;

@@ -1,8 +1,10 @@
-//! The map as a Parquet table: the columns of the CSV, and the plan beside them.
+//! The map as a Parquet table: the columns of the CSV with their units, and the plan beside them.
 
+use super::arrow_schema::{self, Field, Type as ArrowType};
 use super::cell::Cell;
 use super::plan::Plan;
 use super::tiles::TilesError;
+use crate::unit::Unit;
 use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type};
 use parquet::errors::ParquetError;
@@ -64,11 +66,17 @@ pub fn write(
     to: impl Write + Send,
 ) -> Result<(), TableError> {
     let plan = json(plan);
+    let no_columns = columns(&[]);
+    let fields: Vec<Field> = no_columns.iter().map(Column::arrow_field).collect();
+    let units = KeyValue::new(arrow_schema::KEY.into(), arrow_schema::encode(&fields));
     let properties = WriterProperties::builder()
         .set_created_by(concat!("sim-host ", env!("CARGO_PKG_VERSION")).into())
-        .set_key_value_metadata(Some(vec![KeyValue::new(PLAN_KEY.into(), plan.clone())]))
+        .set_key_value_metadata(Some(vec![
+            KeyValue::new(PLAN_KEY.into(), plan.clone()),
+            units,
+        ]))
         .build();
-    let schema = schema(&columns(&[]))?;
+    let schema = schema(&no_columns)?;
     let mut file = SerializedFileWriter::new(to, Arc::new(schema), Arc::new(properties))?;
     // Of `[plan,[cell,...]]`.
     let mut checksum = CHECKSUM.digest();
@@ -155,6 +163,21 @@ fn names<T: Serialize>(name: &'static str, cells: &[Cell], of: fn(&Cell) -> T) -
 }
 
 impl Column {
+    fn arrow_field(&self) -> Field {
+        let (data_type, nullable) = match self.values {
+            Values::Names(_) => (ArrowType::Utf8, false),
+            Values::Numbers(_) => (ArrowType::Double, false),
+            Values::NumbersOrNone(_) => (ArrowType::Double, true),
+            Values::CountsOrNone(_) => (ArrowType::Int32, true),
+        };
+        Field {
+            name: self.name,
+            data_type,
+            nullable,
+            unit: Unit::of(self.name).map(|unit| unit.symbol),
+        }
+    }
+
     fn field(&self) -> parquet::errors::Result<Arc<Type>> {
         let (physical, logical, repetition) = match self.values {
             Values::Names(_) => (

@@ -12,6 +12,9 @@ use shared_model::bus::Message;
 use std::io::Write;
 use std::path::Path;
 
+/// CAN database that names the signals of the frames.
+pub const DATABASE: &str = include_str!("../../dithersteer.dbc");
+
 /// A frame of a log.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {

@@ -28,12 +28,13 @@ const fn unit(suffix: &'static str, symbol: &'static str, exponents: [i8; 5]) ->
 const RPM: f64 = std::f64::consts::TAU / 60.0;
 
 /// All units. Where the end of a name fits several, the longest counts.
-pub const ALL: [Unit; 24] = [
+pub const ALL: [Unit; 25] = [
     unit("_m", "m", [0, 1, 0, 0, 0]),
     unit("_m_per_s2", "m/s^2", [0, 1, -2, 0, 0]),
     unit("_kg", "kg", [1, 0, 0, 0, 0]),
     unit("_kg_m2", "kg.m^2", [1, 2, 0, 0, 0]),
     unit("_s", "s", [0, 0, 1, 0, 0]),
+    unit("_per_s", "1/s", [0, 0, -1, 0, 0]),
     unit("_hz", "Hz", [0, 0, -1, 0, 0]),
     unit("_n", "N", [1, 1, -2, 0, 0]),
     unit("_nm", "N.m", [1, 2, -2, 0, 0]),
@@ -69,7 +70,7 @@ impl Unit {
     /// The unit of a quantity of that name; `None` if the name carries none.
     ///
     /// ```
-    /// use dithersteer_fmu::unit::Unit;
+    /// use dynamics::unit::Unit;
     /// let symbol = |name| Unit::of(name).map(|unit| unit.symbol);
     /// assert_eq!(symbol("steering.damping_nm_s_per_rad"), Some("N.m.s/rad"));
     /// assert_eq!(symbol("tires.front.stiffness_per_rad"), Some("1/rad"));
