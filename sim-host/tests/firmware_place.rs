@@ -19,7 +19,13 @@ fn installed(place: &Path) -> Command {
     let bin = place.join("bin");
     fs::create_dir_all(&bin).expect("a folder can be made");
     let program = bin.join("sim-host");
-    fs::copy(env!("CARGO_BIN_EXE_sim-host"), &program).expect("the program can be copied");
+    // By another process: a program that this one has open for writing cannot be started, and a test
+    // beside this one that starts a process keeps it open for a moment.
+    let copied = Command::new("cp")
+        .arg(env!("CARGO_BIN_EXE_sim-host"))
+        .arg(&program)
+        .status();
+    assert!(copied.expect("cp starts").success());
     let mut command = Command::new(program);
     command
         .args(["pil", "--time", "1"])
