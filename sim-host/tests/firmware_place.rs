@@ -1,8 +1,10 @@
 //! The program finds the firmware's image from any working directory.
 
 mod common;
+mod installed;
 
 use common::{assert_ends, assert_refused, folder};
+use installed::copy_program;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -19,13 +21,7 @@ fn installed(place: &Path) -> Command {
     let bin = place.join("bin");
     fs::create_dir_all(&bin).expect("a folder can be made");
     let program = bin.join("sim-host");
-    // By another process: a program that this one has open for writing cannot be started, and a test
-    // beside this one that starts a process keeps it open for a moment.
-    let copied = Command::new("cp")
-        .arg(env!("CARGO_BIN_EXE_sim-host"))
-        .arg(&program)
-        .status();
-    assert!(copied.expect("cp starts").success());
+    copy_program(&program);
     let mut command = Command::new(program);
     command
         .args(["pil", "--time", "1"])

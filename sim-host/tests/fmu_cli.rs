@@ -1,9 +1,11 @@
 //! `sim-host fmu`: bad input, and the place of the units' library.
 
 mod common;
+mod installed;
 
 use common::{assert_ends, assert_refused, command, folder};
 use fmu::archive::LIBRARY;
+use installed::copy_program;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -48,7 +50,7 @@ fn an_installed_program_finds_the_library_beside_it() {
     let folder = folder();
     let at = folder.path();
     let installed = at.join("sim-host");
-    fs::copy(PROGRAM, &installed).unwrap();
+    copy_program(&installed);
     let run = || {
         let mut command = Command::new(&installed);
         command.args(["fmu", "ecu", "--out", "installed.fmu"]);

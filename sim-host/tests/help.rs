@@ -22,7 +22,7 @@ const WITH_FIRMWARE: [&str; 6] = [
 /// Where the firmware's images are.
 const IMAGES: &str = "thumbv7em-none-eabihf";
 /// Examples of some seconds of work and more.
-const LONG: [&str; 14] = [
+const LONG: [&str; 18] = [
     "sim-host reproduce --quick # everything in seconds",
     "sim-host reproduce # full quality, in target/reproduction",
     "sim-host reproduce --config vehicle.toml --out target/vehicle",
@@ -35,6 +35,10 @@ const LONG: [&str; 14] = [
     "sim-host regions --from 1820 --to 1860 --step 1 --width 0.1 --transient 1000 --time 2000 --json regions.json",
     "sim-host regions --from 1600 --to 1900 --step 5 --figure regions.svg # the paper's regions I to IV",
     "sim-host map --speeds 64 --amplitudes 64 --out map.csv --parquet map.parquet --figure map.svg",
+    "sim-host feedback --from 1560 --step 20 --table table.rs # for the ECU",
+    "sim-host regions --over amplitude --dither square --from 0 --to 0.14 --step 0.002 --out regions-square.csv",
+    "sim-host map --dither square --from 1700 --to 1800 --step 2 --square-to 0.1 --square-step 0.002 --figure map-detail.svg",
+    "sim-host lyapunov --rpm 1600 --method printed-response # equation (20)",
     "sim-host averaging --dither square --amplitude-v 0.1",
     "sim-host averaging --dither sine --amplitude-v 1 --from 500 --to 20000 --points 9 --figure averaging.svg",
 ];
