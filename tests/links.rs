@@ -1,8 +1,7 @@
 //! Links between the texts of the repository: the file is there, and so is the heading.
 
 use std::fs;
-use std::process::Command;
-use tests::root;
+use tests::{root, tracked};
 
 /// The targets of all links and pictures.
 fn links(text: &str) -> Vec<&str> {
@@ -27,23 +26,11 @@ fn has_heading(text: &str, wanted: &str) -> bool {
     headings.map(anchor).any(|anchor| anchor == wanted)
 }
 
-/// All Markdown files that git tracks.
-fn files() -> Vec<String> {
-    let git = Command::new("git")
-        .args(["ls-files", "*.md"])
-        .current_dir(root())
-        .output()
-        .expect("git starts");
-    assert!(git.status.success(), "git ls-files: {}", git.status);
-    let names = String::from_utf8(git.stdout).expect("names are UTF-8");
-    names.lines().map(str::to_owned).collect()
-}
-
 #[test]
 fn every_link_leads_somewhere() {
     let mut broken = Vec::new();
     let mut checked = 0;
-    for file in files() {
+    for file in tracked("*.md") {
         let path = root().join(&file);
         // A tracked file may have been removed and not yet committed.
         let Ok(text) = fs::read_to_string(&path) else {
@@ -74,14 +61,9 @@ fn every_link_leads_somewhere() {
 /// A command with `-p PACKAGE --example NAME` finds the example in one of the crates.
 #[test]
 fn every_example_that_is_named_is_there() {
-    let git = Command::new("git")
-        .args(["ls-files", "*/examples/*.rs"])
-        .current_dir(root())
-        .output()
-        .expect("git starts");
-    let sources = String::from_utf8(git.stdout).expect("names are UTF-8");
+    let sources = tracked("*/examples/*.rs").join("\n");
     let mut named = 0;
-    for file in files() {
+    for file in tracked("*.md") {
         let text = fs::read_to_string(root().join(&file)).unwrap_or_default();
         for rest in text.split("--example ").skip(1) {
             let name = rest.split_whitespace().next().unwrap_or_default();
@@ -99,7 +81,7 @@ fn every_example_that_is_named_is_there() {
 fn every_chapter_is_in_the_book() {
     let contents = fs::read_to_string(root().join("docs/SUMMARY.md")).expect("it is there");
     let listed = links(&contents);
-    for file in files() {
+    for file in tracked("*.md") {
         if let Some(chapter) = file.strip_prefix("docs/")
             && chapter != "SUMMARY.md"
         {

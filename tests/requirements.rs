@@ -3,8 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::process::Command;
-use tests::root;
+use tests::{root, tracked};
 
 /// Number of a requirement's row in the table, `| SR07 | ...`.
 fn row(line: &str) -> Option<&str> {
@@ -25,30 +24,12 @@ fn is_number(text: &str) -> bool {
     text.len() == 2 && text.chars().all(|c| c.is_ascii_digit())
 }
 
-/// All Rust sources that git tracks or would track.
-fn sources() -> Vec<String> {
-    let git = Command::new("git")
-        .args([
-            "ls-files",
-            "--cached",
-            "--others",
-            "--exclude-standard",
-            "*.rs",
-        ])
-        .current_dir(root())
-        .output()
-        .expect("git starts");
-    assert!(git.status.success(), "git ls-files: {}", git.status);
-    let names = String::from_utf8(git.stdout).expect("names are UTF-8");
-    names.lines().map(str::to_owned).collect()
-}
-
 #[test]
 fn every_requirement_has_a_test() {
     let page = fs::read_to_string(root().join("docs/safety.md")).expect("the page is there");
     let required: BTreeSet<&str> = page.lines().filter_map(row).collect();
     assert!(required.len() > 15, "{required:?}");
-    let texts: Vec<String> = sources()
+    let texts: Vec<String> = tracked("*.rs")
         .iter()
         // A tracked file may have been removed and not yet committed.
         .filter_map(|name| fs::read_to_string(root().join(name)).ok())

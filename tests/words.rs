@@ -6,8 +6,7 @@
 
 use std::fs;
 use std::path::Path;
-use std::process::Command;
-use tests::root;
+use tests::{root, tracked};
 
 /// A group of phrases.
 struct Rule {
@@ -296,14 +295,7 @@ fn lines_with(phrase: &str, words: &[Word]) -> Vec<usize> {
 
 /// All Markdown and Rust files that git tracks.
 fn files() -> Vec<String> {
-    let git = Command::new("git")
-        .args(["ls-files", "*.md", "*.rs"])
-        .current_dir(root())
-        .output()
-        .expect("git starts");
-    assert!(git.status.success(), "git ls-files: {}", git.status);
-    let names = String::from_utf8(git.stdout).expect("names are UTF-8");
-    let files: Vec<_> = names.lines().map(str::to_owned).collect();
+    let files = [tracked("*.md"), tracked("*.rs")].concat();
     assert!(files.len() > 100, "the checkout has more files");
     files
 }

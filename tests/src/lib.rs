@@ -12,6 +12,7 @@ use qemu::{self, Finished, Machine, RunError};
 use shared_model::Scenario;
 use shared_model::dither::{Application, Waveform};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Duration;
 
 /// Far more than any run of the tests takes.
@@ -132,4 +133,16 @@ pub fn sim_host() -> PathBuf {
         program.display()
     );
     program
+}
+
+/// All files of a pattern that git tracks.
+pub fn tracked(pattern: &str) -> Vec<String> {
+    let git = Command::new("git")
+        .args(["ls-files", pattern])
+        .current_dir(root())
+        .output()
+        .expect("git starts");
+    assert!(git.status.success(), "git ls-files: {}", git.status);
+    let names = String::from_utf8(git.stdout).expect("names are UTF-8");
+    names.lines().map(str::to_owned).collect()
 }
